@@ -36,7 +36,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import beta
 
-from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.features import constant_wind
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import LEVELS, Scenario, generate_scenario, with_disturbances
 from uas_coverage_env.simulation import World
@@ -282,7 +282,7 @@ def fly(
     )
     n_uas = len(world.names)
     commands = np.zeros(n_uas, COMMAND_DTYPE)
-    status, x = world.state.status, world.state.x
+    status, x = world.state.uas["status"], world.state.x
     away_m = np.zeros((n_uas, 2))
     rng = np.random.default_rng([seed, list(POLICIES).index(policy), 1])
     wishes = [POLICIES[policy](rng, world.scenario.dt_s, away_m[i]) for i in range(n_uas)]

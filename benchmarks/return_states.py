@@ -98,7 +98,7 @@ def _put_anywhere(world: World, rng: np.random.Generator, larger: float) -> None
             and all(h.signed_distance(place_m) > larger * _FROM_WALLS_M for h in scenario.hulls)
         ):
             break
-    state.x[0, :3], state.x[0, DOD], state.departed[0] = place_m, 0.0, True
+    state.x[0, :3], state.x[0, DOD], state.uas[0].departed = place_m, 0.0, True
 
 
 def _any_velocity(world: World, rng: np.random.Generator, speed_mps: float) -> Velocity:
@@ -110,9 +110,9 @@ def _any_velocity(world: World, rng: np.random.Generator, speed_mps: float) -> V
 def _almost_called(world: World, rng: np.random.Generator) -> bool:
     """Take charge until return mode is about to call; whether the battery holds as much."""
     arena, state = world.arena, world.state
-    x, belief, dod_max = state.x[0], state.belief[0], float(arena.uas["dod_max"][0])
+    x, belief, dod_max = state.x[0], state.uas[0].belief[:], float(arena.uas["dod_max"][0])
     per_s = float(arena.uas["dod_per_s"][0]) * (1.0 + max(float(belief[CONSUMPTION]), 0.0))
-    state.returning[0] = False
+    state.uas[0].returning = False
     for spare_s in _SPARE_S:
         keep_s = max(seconds_home(arena, 0, x), seconds_to_keep(arena, 0, x, math.inf, belief))
         x[DOD] = dod_max - per_s * (keep_s + spare_s * rng.uniform(0.5, 1.0))
@@ -131,7 +131,7 @@ def _state(world: World, rng: np.random.Generator, larger: float) -> bool:
     for _ in range(round(rng.uniform(*_LEARNS_S) / world.scenario.dt_s)):
         if world.done:
             return False
-        world.state.returning[0] = False
+        world.state.uas[0].returning = False
         world.step({name: command})
     return not world.done and _almost_called(world, rng)
 
@@ -141,11 +141,11 @@ def _fly(world: World, command: Command) -> Returned:
     lost_to = None
     while not world.done:
         outcome = world.step({name: command})
-        if state.returning[0] and called_at_m is None:
+        if state.uas[0].returning and called_at_m is None:
             called_at_m = state.x[0, :3].copy()
         if outcome["contact"][0]:
             lost_to = CONTACT_NAMES[outcome["contact"][0]]
-    if state.status[0] != LANDED and lost_to is None:
+    if state.uas[0].status != LANDED and lost_to is None:
         lost_to = "the clock"
     dod_max = float(world.arena.uas["dod_max"][0])
     return Returned(lost_to, called_at_m, 1.0 - float(state.x[0, DOD]) / dod_max)

@@ -131,14 +131,14 @@ def flown_returns(
         world.reset()
         state.x[0, :3] = _place(scenario, rng)
         state.x[0, DOD] = rng.uniform(0.0, _DEEPEST)
-        state.departed[0] = True
+        state.uas[0].departed = True
         aside = GoTo(int(rng.integers(len(scenario.waypoints))))
         for _ in range(int(rng.integers(_ASIDE_STEPS))):
             world.step({name: aside})
-        x, belief, turned_s = state.x[0].copy(), state.belief[0].copy(), world.time_s
+        x, belief, turned_s = state.x[0].copy(), state.uas[0].belief[:].copy(), world.time_s
         while not world.done and world.time_s < scenario.max_steps * scenario.dt_s:
             world.step({name: GoTo(None)})
-        if state.status[0] != LANDED:
+        if state.uas[0].status != LANDED:
             raise RuntimeError(f"the UAS of town {seed} did not come home from {x[:3].tolist()}")
         dod = float(state.x[0, DOD] - x[DOD])
         yield Return(scenario, x, world.time_s - turned_s, dod, belief)

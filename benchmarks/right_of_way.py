@@ -137,7 +137,7 @@ def fly(name: str, seed: int, n_uas: int) -> Counter[str]:
     mates = [i for i in range(n_uas) if i != chosen]
     commands = np.zeros(n_uas, COMMAND_DTYPE)
     tally = Counter(missions=1)
-    status, x = world.state.status, world.state.x
+    status, x = world.state.uas["status"], world.state.x
     while status[chosen] == FLYING and world.state.step[0] < STEPS:
         scene = Scene(x[chosen, :3].copy(), world.arena.uas["home_m"][chosen], corner_m)
         commands[chosen] = (_VELOCITY, _velocity(scene.place_m, corner_m, slows=False), False)

@@ -80,8 +80,8 @@ def _world(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _observation(arena, state, tables, view, rules, spare, row):
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
             observe_one(arena, state, tables, view.learners, rules.observing, i, row[i], None)
 
 
@@ -92,17 +92,17 @@ def _actions(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _inner_loop(arena, state, tables, view, rules, spare, row):
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
             command = view.scratch.commands[i]
-            reference = state.reference[i]
+            reference = state.uas[i].reference_mps[:]
             command_wrench(arena.vehicles[i], state.x[i], reference, command, spare)
 
 
 @compiled
 def _model(arena, state, tables, view, rules, spare, row):
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
             lpv_step(arena.vehicles[i], state.x[i], view.scratch.outcome[i].u, spare)
 
 
@@ -132,31 +132,31 @@ def _reward(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _nearest(arena, state, tables, view, rules, spare, row):
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
             nearest_waypoints(arena, state, i, view.learners.candidates[i])
 
 
 @compiled
 def _waypoints(arena, state, tables, view, rules, spare, row):
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
             columns = slice_view(row[i], AT.waypoints, SIZE.waypoints)
             write_waypoints(arena, state, tables, view.learners, i, columns)
 
 
 @compiled
 def _surroundings(arena, state, tables, view, rules, spare, row):
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
             columns = slice_view(row[i], AT.surroundings, SIZE.surroundings)
             write_surroundings(arena, state, i, columns)
 
 
 @compiled
 def _movers(arena, state, tables, view, rules, spare, row):
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
             columns = slice_view(row[i], AT.others, SIZE.others)
             write_others(arena, state, tables, i, columns)
             columns = slice_view(row[i], AT.moving_obstacles, SIZE.moving_obstacles)

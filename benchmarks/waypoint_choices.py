@@ -64,7 +64,7 @@ def by_greedy_rollout(scenarios: Sequence[Scenario]) -> NDArray:
     worlds, legs = pool_worlds(scenarios), pool_legs(scenarios)
     n = len(scenarios)
     lanes, states = make_lanes(n, worlds)
-    covered, discharged = np.zeros(states.uncovered.shape, bool), np.zeros(states.status.shape)
+    covered, discharged = np.zeros(states.uncovered.shape, bool), np.zeros(states.uas.shape)
     each = np.arange(n)
     helped = (True, assistants(True, True))
     begin_lanes(worlds, legs, lanes, states, each, each, covered, discharged, *helped)

@@ -3,7 +3,7 @@
 import math
 
 from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.disturbances import Disturbance, normal, uniform
+from uas_coverage_env.features import Disturbance, normal, uniform
 from uas_coverage_env.vehicle import DEVIATIONS, LIFT
 
 

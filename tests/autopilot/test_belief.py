@@ -10,7 +10,7 @@ from small_worlds import meadow
 from uas_coverage_env import load_scenario, rollout
 from uas_coverage_env.autopilot import seconds_to_keep
 from uas_coverage_env.autopilot.belief import learn, speed_along
-from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.features import constant_wind
 from uas_coverage_env.flight.record import LANDED as FLIGHT_LANDED
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.simulation import World

@@ -5,10 +5,10 @@ import pytest
 from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env.autopilot import has_to_return
-from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.features import constant_wind
+from uas_coverage_env.features.wind import Gust, Wind
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.scenario import sample_scenario, with_disturbances
-from uas_coverage_env.scenario.air import Gust, Wind
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, X, Y
 from uas_coverage_env.world import LANDED, LOST, GoTo, Velocity

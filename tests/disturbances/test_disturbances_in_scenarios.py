@@ -12,7 +12,7 @@ from small_worlds import meadow
 
 from uas_coverage_env import MissionBrief, World, load_scenario, rollout
 from uas_coverage_env.cli.app import main
-from uas_coverage_env.disturbances import disturbances_of
+from uas_coverage_env.features import disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.scenario import DisturbanceTable, Wind, disturbance_tables

@@ -9,7 +9,7 @@ from own_disturbances import NOT_FINITE, RETURNS, gusts, push, weak_rotors
 from small_worlds import meadow, waypoint
 
 from uas_coverage_env import World
-from uas_coverage_env.disturbances import Disturbance, constant_wind, disturbances_of
+from uas_coverage_env.features import Disturbance, constant_wind, disturbances_of
 from uas_coverage_env.scenario import Scenario, Wind
 from uas_coverage_env.scenario.toml_text import toml_text
 from uas_coverage_env.simulation.pool import pool_worlds

@@ -9,7 +9,7 @@ from own_disturbances import push
 from small_worlds import mover
 
 from uas_coverage_env import MissionBrief, World, rollout
-from uas_coverage_env.disturbances import disturbances_of
+from uas_coverage_env.features import disturbances_of
 from uas_coverage_env.flight import accomplished, coverage, home, summary
 from uas_coverage_env.vehicle import DOD, LIFT, VX
 from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity, Wrench

@@ -7,8 +7,8 @@ import pytest
 from small_worlds import meadow
 
 from uas_coverage_env import MissionBrief, World, generate_scenario, load_scenario
-from uas_coverage_env.disturbances import disturbances_of
 from uas_coverage_env.env import CoverageVectorEnv
+from uas_coverage_env.features import disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import (
     FAMILIES,

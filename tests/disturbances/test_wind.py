@@ -8,7 +8,7 @@ import pytest
 from small_worlds import meadow
 
 from uas_coverage_env import World, load_scenario
-from uas_coverage_env.disturbances import constant_wind, disturbances_of
+from uas_coverage_env.features import constant_wind, disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Gust, RandomGusts, Wind
 from uas_coverage_env.vehicle import DOD, VX, VZ, X, Y, Z, load_vehicle

@@ -6,7 +6,7 @@ from own_actions import CLIMB_RATE
 from own_disturbances import deviating, drained, gusts, push, weak_rotors
 from practice_grounds import practice_ground
 
-from uas_coverage_env.disturbances import disturbances_of
+from uas_coverage_env.features import disturbances_of
 from uas_coverage_env.scenario import with_disturbances
 
 GROUND = practice_ground(n_uas=2, max_steps=5)

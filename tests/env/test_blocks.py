@@ -12,7 +12,6 @@ from own_blocks import SLOW, beacon
 from practice_grounds import practice_ground
 
 from uas_coverage_env import load_planner, uas_coverage_v0
-from uas_coverage_env.disturbances import constant_wind
 from uas_coverage_env.env import (
     OBSERVATION,
     OBSERVATION_SIZE,
@@ -26,6 +25,7 @@ from uas_coverage_env.env import (
     observation_columns,
 )
 from uas_coverage_env.env.actions.velocity import VELOCITY
+from uas_coverage_env.features import constant_wind
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle import VX, VY, X, Y
 

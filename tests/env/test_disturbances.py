@@ -10,9 +10,9 @@ from own_disturbances import NOT_FINITE, gusts, push, weak_rotors
 from practice_grounds import practice_ground
 
 from uas_coverage_env import World, uas_coverage_v0
-from uas_coverage_env.disturbances import constant_wind, disturbances_of
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.cuda import CudaMissions
+from uas_coverage_env.features import constant_wind, disturbances_of
 from uas_coverage_env.scenario import Wind, with_disturbances
 
 GROUND = practice_ground(n_uas=2, max_steps=12)

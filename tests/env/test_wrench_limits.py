@@ -20,8 +20,8 @@ from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions.wrench import WRENCH
 from uas_coverage_env.env.memory import CONTACT
+from uas_coverage_env.features.wind import Gust
 from uas_coverage_env.scenario import Waypoint, Wind
-from uas_coverage_env.scenario.air import Gust
 from uas_coverage_env.vehicle import LIMIT_NAMES, VX, VY, load_vehicle
 from uas_coverage_env.vehicle.layout import PHI, THETA
 from uas_coverage_env.world import CommandKind

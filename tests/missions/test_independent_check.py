@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from own_disturbances import gusts
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
-from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.features import constant_wind
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.world import Wrench

@@ -6,7 +6,7 @@ from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env import World, rollout
 from uas_coverage_env.autopilot.lookahead import fly_and_brake
-from uas_coverage_env.disturbances import constant_wind
+from uas_coverage_env.features import constant_wind
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import LEVELS, with_disturbances
 from uas_coverage_env.world import GoTo, Velocity, build_arena

@@ -14,9 +14,9 @@ from uas_coverage_env.autopilot.guidance import steer
 from uas_coverage_env.autopilot.return_mode import call_home
 from uas_coverage_env.autopilot.safety import filter_commands
 from uas_coverage_env.compiled.calls import Signature
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.outcome import OUTCOME_DTYPE
-from uas_coverage_env.world.state import STATE
 
 AssistantCode = NDArray[np.int64]
 """Addresses of the assistants' machine code, in the order in which they are called. They hold for

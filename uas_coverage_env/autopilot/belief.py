@@ -14,6 +14,8 @@ import math
 
 from uas_coverage_env.autopilot.control import steered_wrench
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.entities.commands import CLIMB, VELOCITY, WRENCH
+from uas_coverage_env.entities.state import CONSUMPTION, EXPECTED, EXPECTED_DOD, SINK, WIND
 from uas_coverage_env.vehicle import (
     DOD,
     LIFT,
@@ -31,8 +33,6 @@ from uas_coverage_env.vehicle import (
 )
 from uas_coverage_env.vehicle.layout import SPEED
 from uas_coverage_env.vehicle.tube import FORGETS_S
-from uas_coverage_env.world.commands import CLIMB, VELOCITY, WRENCH
-from uas_coverage_env.world.state import CONSUMPTION, EXPECTED, EXPECTED_DOD, SINK, WIND
 
 SEES_CONSUMPTION_S = 30.0
 """Likewise that in the consumption, which takes longer to tell from noise [s]."""

@@ -1,6 +1,7 @@
 """From a command to the wrench that flies it."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.entities.commands import ACCELERATION, CLIMB, VELOCITY
 from uas_coverage_env.vehicle import (
     LIFT,
     TAU_Z,
@@ -9,7 +10,6 @@ from uas_coverage_env.vehicle import (
     velocity_climb_wrench,
     velocity_wrench,
 )
-from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 
 
 @kernel

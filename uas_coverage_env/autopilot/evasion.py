@@ -26,8 +26,8 @@ from uas_coverage_env.autopilot.lookahead import (
     required_from,
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel, kernel, stack_array
+from uas_coverage_env.entities.commands import CLIMB
 from uas_coverage_env.geometry import cylinder_clearance
-from uas_coverage_env.world.commands import CLIMB
 
 _ROOM, _NORTH, _EAST, _DOWN = range(4)
 """Of the best flight so far: its room [m] and its velocity [m/s]."""
@@ -89,12 +89,19 @@ def _room_m(arena, step, i, path_m):
 def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
     """Whether braking after one step of a command is clear of all that stands still or brakes."""
     n_flown, slack_m = fly_and_brake(
-        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m, state.belief[i]
+        arena,
+        i,
+        state.x[i],
+        state.uas[i].reference_mps[:],
+        command,
+        nonlinear,
+        path_m,
+        state.uas[i].belief[:],
     )
     enough_m = -TOLERANCE_M
     slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
     if slack_m >= enough_m:
-        slack_m = peer_slack(arena, state.status, i, path_m, committed_m, enough_m, slack_m)
+        slack_m = peer_slack(arena, state.uas, i, path_m, committed_m, enough_m, slack_m)
     return slack_m >= enough_m
 
 
@@ -102,12 +109,12 @@ def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
 def _is_open(arena, state, i, command, n_held, nonlinear, path_m, committed_m):
     """Whether an evasive flight meets nothing that stands still and no path of another UAS."""
     fly_hold_and_brake(
-        arena, i, state.x[i], state.reference[i], command, n_held, nonlinear, path_m,
-        state.belief[i],
+        arena, i, state.x[i], state.uas[i].reference_mps[:], command, n_held, nonlinear, path_m,
+        state.uas[i].belief[:],
     )  # fmt: skip
     slack_m = fixed_slack(arena, i, path_m, path_m.shape[0] - 1, 0.0, PLENTY_M)
     if slack_m >= 0.0:
-        slack_m = peer_slack(arena, state.status, i, path_m, committed_m, 0.0, slack_m)
+        slack_m = peer_slack(arena, state.uas, i, path_m, committed_m, 0.0, slack_m)
     return slack_m >= 0.0
 
 

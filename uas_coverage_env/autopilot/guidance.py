@@ -9,9 +9,10 @@ from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.autopilot.low_way import low_way
 from uas_coverage_env.autopilot.way_out import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
 from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
+from uas_coverage_env.entities.commands import GO_TO, HOME, VELOCITY
+from uas_coverage_env.entities.state import FLYING, WIND
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import (
     CLEAR,
@@ -21,7 +22,6 @@ from uas_coverage_env.world.routes import (
     level_apart,
     route,
 )
-from uas_coverage_env.world.state import FLYING, WIND
 
 LEAD_S = 1.6
 """The inner loop follows a velocity with about this delay; guidance steers from ahead [s]."""
@@ -291,11 +291,11 @@ def steer(arena, state, nonlinear, outcome):
         nonlinear: Whether the world flies the 6-DOF plant.
         outcome: (U,) of OUTCOME_DTYPE; applied_command and returning are written.
     """
-    for i in range(state.status.shape[0]):
-        if state.status[i] != FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status != FLYING:
             continue
         command = outcome[i].applied_command
-        if state.returning[i]:
+        if state.uas[i].returning:
             command.kind = GO_TO
             command.values[0] = HOME
             command.returning = True
@@ -304,6 +304,6 @@ def steer(arena, state, nonlinear, outcome):
             target = int(command.values[0])
             stop = comes_to_rest(arena, state, target)
             guide(
-                arena, i, state.x[i], state.reference[i], target, stop, nonlinear, command,
-                state.belief[i],
+                arena, i, state.x[i], state.uas[i].reference_mps[:], target, stop, nonlinear,
+                command, state.uas[i].belief[:],
             )  # fmt: skip

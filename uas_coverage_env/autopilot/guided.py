@@ -3,11 +3,11 @@
 import numpy as np
 
 from uas_coverage_env.autopilot.guidance import steer
+from uas_coverage_env.entities.commands import GO_TO, HOME, VELOCITY, GoTo, Velocity, command_mode
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import WorldState
 from uas_coverage_env.vehicle import VZ, Z
 from uas_coverage_env.world.arena import Arena
-from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY, GoTo, Velocity, command_mode
-from uas_coverage_env.world.outcome import OUTCOME_DTYPE
-from uas_coverage_env.world.state import WorldState
 
 
 def velocity_of(
@@ -26,12 +26,14 @@ def velocity_of(
         A velocity of the same mode. Where guidance brakes, which it does by vertical speed and not
         by altitude, its altitude is the one that stops a climb or descent at once.
     """
-    outcome = np.zeros(len(state.status), OUTCOME_DTYPE)
+    outcome = np.zeros(len(state.uas), OUTCOME_DTYPE)
     given = outcome[i]["applied_command"]
     given["kind"] = GO_TO
     given["values"][0] = HOME if command.waypoint is None else command.waypoint
     # return mode would be obeyed instead
-    steer(arena, state._replace(returning=np.zeros_like(state.returning)), nonlinear, outcome)
+    uas = state.uas.copy()
+    uas["returning"] = False
+    steer(arena, state._replace(uas=uas), nonlinear, outcome)
     north_mps, east_mps, altitude_m, _ = given["values"].tolist()
     if given["kind"] != VELOCITY:
         vehicle = arena.vehicles[i]

@@ -5,6 +5,8 @@ import math
 from uas_coverage_env.autopilot.belief import believed_kinematics, believed_wrench
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.entities.commands import WRENCH
+from uas_coverage_env.entities.state import FLYING, WIND
 from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
 from uas_coverage_env.vehicle import (
     N_INPUTS,
@@ -23,11 +25,9 @@ from uas_coverage_env.vehicle import (
     plant_step,
     reseed_reference,
 )
-from uas_coverage_env.world.commands import WRENCH
 from uas_coverage_env.world.contacts import face_between, moving_clearance
 from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart
-from uas_coverage_env.world.state import FLYING, WIND
 
 TOLERANCE_M = 1e-3
 """Clearances of a braking flight may be missed by this: rounding must not forbid braking on."""
@@ -358,12 +358,12 @@ def separation_at(path_m, other_m, k):
 
 
 @inlined_kernel
-def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
+def peer_slack(arena, uas, i, path_m, committed_m, enough_m, slack_m):
     """Least distance to spare from the paths to which the other UAS are committed.
 
     Args:
         arena: The arena.
-        status: (U,) status of all UAS.
+        uas: `WorldState.uas`.
         i: Index of the UAS.
         path_m: (N+1, 3) [m] its path.
         committed_m: (U, N+1, 3) [m] the paths of all UAS.
@@ -374,8 +374,8 @@ def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
         The smaller of slack_m and the distance to spare [m].
     """
     tube_m = arena.tube_m
-    for j in range(status.shape[0]):
-        if j == i or status[j] != FLYING:
+    for j in range(uas.shape[0]):
+        if j == i or uas[j].status != FLYING:
             continue
         other_m = committed_m[j]
         least_m = arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m

@@ -10,12 +10,12 @@ import math
 
 from uas_coverage_env.autopilot.belief import estimated_speed, speed_along, wind_growth
 from uas_coverage_env.compiled.kernels import kernel, stack_array
+from uas_coverage_env.entities.state import WIND
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import X, Y, Z
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.obstacles import NODE_MARGIN_M
 from uas_coverage_env.world.routes import crossing
-from uas_coverage_env.world.state import WIND
 
 LITTLE_MPS = 2.0
 """Headway below which a UAS flies low: of a wind that is known to about a metre per second."""

@@ -5,10 +5,10 @@ import math
 from uas_coverage_env.autopilot.guidance import path_length_home_m
 from uas_coverage_env.autopilot.way_home import flight_home, latest_flight_home
 from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.entities.state import CONSUMPTION, FLYING, WIND
 from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.vehicle.range import SpeedLimits, TravelTimeModel, flight_seconds
 from uas_coverage_env.world.coverage import can_cover
-from uas_coverage_env.world.state import CONSUMPTION, FLYING, WIND
 
 RETURN_MODE = TravelTimeModel(speed_share=2.0 / 3.0, in_turn=True, landing_s=12.0)
 """On the way home a UAS turns, climbs, and is held up by others. Chosen by hand;
@@ -96,7 +96,7 @@ def _calls_home(arena, state, i, share, more_s):
         return True
     if x[DOD] + home_s * uas.dod_per_s >= uas.dod_max:
         return True
-    belief = state.belief[i]
+    belief = state.uas[i].belief[:]
     if rules.disturbed:
         wind_mps = math.hypot(belief[WIND], belief[WIND + 1])
         if wind_mps > _TOO_STRONG * arena.vehicles[i].reference_max_mps:
@@ -129,10 +129,10 @@ def call_home(arena, state, nonlinear, outcome):
         nonlinear: Not asked for: all assistants are called with the same arguments.
         outcome: Likewise.
     """
-    for i in range(state.status.shape[0]):
-        if state.status[i] != FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status != FLYING:
             continue
-        if not state.returning[i]:
-            state.returning[i] = has_to_return(arena, state, i)
+        if not state.uas[i].returning:
+            state.uas[i].returning = has_to_return(arena, state, i)
         elif arena.rules[0].disturbed:
-            state.returning[i] = _calls_home(arena, state, i, _AMPLE, _AMPLE_S)
+            state.uas[i].returning = _calls_home(arena, state, i, _AMPLE, _AMPLE_S)

@@ -11,7 +11,7 @@ gives up its room for braking because of it.
 from uas_coverage_env.autopilot.evasion import LINGERING
 from uas_coverage_env.autopilot.lookahead import fly_hold_and_brake, separation_at
 from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.world.state import FLYING
+from uas_coverage_env.entities.state import FLYING
 
 CLAIMED_S = 5.0
 """For how long a UAS on its way home claims to go on as it wishes now [s]; then it brakes."""
@@ -34,13 +34,13 @@ def decision_order(state, order):
         (flying, returning): how many they are.
     """
     n_flying = 0
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING and state.returning[i]:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING and state.uas[i].returning:
             order[n_flying] = i
             n_flying += 1
     n_returning = n_flying
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING and not state.returning[i]:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING and not state.uas[i].returning:
             order[n_flying] = i
             n_flying += 1
     return n_flying, n_returning
@@ -52,7 +52,15 @@ def claim_way(arena, state, i, command, nonlinear, claim_m):
     n_held = max(1, round(CLAIMED_S / arena.rules[0].dt_s))
     x = state.x[i]
     fly_hold_and_brake(
-        arena, i, x, state.reference[i], command, n_held, nonlinear, claim_m, state.belief[i]
+        arena,
+        i,
+        x,
+        state.uas[i].reference_mps[:],
+        command,
+        n_held,
+        nonlinear,
+        claim_m,
+        state.uas[i].belief[:],
     )
 
 

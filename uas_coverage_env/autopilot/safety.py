@@ -27,8 +27,8 @@ from uas_coverage_env.autopilot.lookahead import (
 )
 from uas_coverage_env.autopilot.right_of_way import claim_way, decision_order, room_beside
 from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
+from uas_coverage_env.entities.commands import ACCELERATION, CLIMB, VELOCITY
 from uas_coverage_env.vehicle import TAU_Z, VX, VY, Z
-from uas_coverage_env.world.commands import ACCELERATION, CLIMB, VELOCITY
 
 _LEAST_SPEED_MPS = 3.0
 _AS_WISHED, _CLIMBING, _SINKING, _LEVEL = range(4)
@@ -67,14 +67,21 @@ _DEFLECTIONS = _deflections()
 def _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m):
     """Least distance to spare from everything when a command is flown and then braked [m]."""
     n_flown, slack_m = fly_and_brake(
-        arena, i, state.x[i], state.reference[i], command, nonlinear, path_m, state.belief[i]
+        arena,
+        i,
+        state.x[i],
+        state.uas[i].reference_mps[:],
+        command,
+        nonlinear,
+        path_m,
+        state.uas[i].belief[:],
     )
     if slack_m >= enough_m:
         slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
     if slack_m >= enough_m:
         slack_m = moving_slack(arena, state.step[0], i, path_m, enough_m, slack_m)
     if slack_m >= enough_m:
-        slack_m = peer_slack(arena, state.status, i, path_m, committed_m, enough_m, slack_m)
+        slack_m = peer_slack(arena, state.uas, i, path_m, committed_m, enough_m, slack_m)
     return slack_m
 
 
@@ -92,8 +99,8 @@ def _wish(arena, state, i, command):
         return values[0], values[1], values[2]
     if kind == ACCELERATION:
         dt_s = arena.rules[0].dt_s
-        north_mps = state.reference[i, 0] + values[0] * dt_s
-        east_mps = state.reference[i, 1] + values[1] * dt_s
+        north_mps = state.uas[i].reference_mps[0] + values[0] * dt_s
+        east_mps = state.uas[i].reference_mps[1] + values[1] * dt_s
         return north_mps, east_mps, 0.0
     return x[VX], x[VY], 0.0
 
@@ -207,7 +214,7 @@ def filter_commands(arena, state, nonlinear, outcome):
         nonlinear: Whether the world flies the 6-DOF plant.
         outcome: (U,) of OUTCOME_DTYPE; applied_command and filtered are written.
     """
-    n_uas = state.status.shape[0]
+    n_uas = state.uas.shape[0]
     n_steps = arena.rules[0].lookahead_steps
     committed_m = np.empty((n_uas, n_steps + 1, 3))
     claims_m = np.empty((n_uas, n_steps + 1, 3))
@@ -220,10 +227,12 @@ def filter_commands(arena, state, nonlinear, outcome):
     for rank in range(1, n_flying):
         i = order[rank]
         x = state.x[i]
-        reference = state.reference[i]
-        fly_and_brake(arena, i, x, reference, brake, nonlinear, committed_m[i], state.belief[i])
+        reference = state.uas[i].reference_mps[:]
+        fly_and_brake(
+            arena, i, x, reference, brake, nonlinear, committed_m[i], state.uas[i].belief[:]
+        )
     for i in range(n_uas):
-        state.filtered[i] = False
+        state.uas[i].filtered = False
     for rank in range(n_flying):
         i = order[rank]
         command = outcome[i].applied_command
@@ -244,4 +253,4 @@ def filter_commands(arena, state, nonlinear, outcome):
         ):
             _replace(arena, state, i, command, nonlinear, path_m, committed_m)
         # only the filter gives this kind of command
-        state.filtered[i] = outcome[i].filtered = command.kind == CLIMB
+        state.uas[i].filtered = outcome[i].filtered = command.kind == CLIMB

@@ -5,10 +5,11 @@ import math
 from uas_coverage_env.autopilot.belief import estimated_speed, vertical_margin_mps
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_position
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.entities.state import WIND
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z
 from uas_coverage_env.vehicle.range import margin_to_land, seconds_to_land
-from uas_coverage_env.world.commands import HOME
 from uas_coverage_env.world.overhangs import is_below_overhang, widest_overhang_m
 from uas_coverage_env.world.routes import (
     CLEAR,
@@ -18,7 +19,6 @@ from uas_coverage_env.world.routes import (
     leg_from_corner,
     route,
 )
-from uas_coverage_env.world.state import WIND
 
 _MOST_LEGS = 12
 _STOPPING = 1.5

@@ -4,8 +4,8 @@ A declaration is a named tuple whose fields say type and axes of their arrays:
 
     class WorldState(NamedTuple):
         x: Annotated[NDArray[np.float64], "U", N_STATES]
-        status: Annotated[NDArray[np.int64], "U", Values(0, 2)]
-        commands: Annotated[NDArray[np.void], COMMAND_DTYPE, "U"]
+        step: Annotated[NDArray[np.int64], 1, Values(0, "samples")]
+        uas: Annotated[NDArray[np.void], UAS_DTYPE, "U", {"status": Values(0, 2)}]
 
 An axis is a number, or the name of a size that all arrays of a mission share. From it follow the
 arrays themselves (`Memory.zeros`), those of many missions side by side (`lanes`) or end to end
@@ -68,13 +68,14 @@ class Field:
         name: Its name.
         dtype: Type of its elements.
         axes: A number, or the name of a size, for each axis.
-        values: What its elements may be; None: every finite number of its type.
+        values: Of a field of its records, or of "" where it has none: what its elements may be;
+            every finite number of its type, where that is not said.
     """
 
     name: str
     dtype: np.dtype
     axes: tuple[Axis, ...]
-    values: Values | None
+    values: Mapping[str, Values]
 
     def shape(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
         """Its shape where the named sizes are known."""
@@ -108,8 +109,8 @@ def _field(name: str, annotation: Any) -> Field:
         if len(scalars) != 1:
             raise TypeError(f"{name}: {array} does not say one type of elements")
         dtype = np.dtype(scalars.pop())
-    values = said.pop() if isinstance(said[-1], Values) else None
-    return Field(name, dtype, tuple(said), values)
+    values = said.pop() if isinstance(said[-1], Values | dict) else {}
+    return Field(name, dtype, tuple(said), {"": values} if isinstance(values, Values) else values)
 
 
 class Pool(NamedTuple):
@@ -267,15 +268,17 @@ class Memory(Generic[T]):
             lanes: Whether the arrays have an axis of lanes in front.
 
         Returns:
-            Name of an array -> lowest and highest value; these broadcast to it.
+            Name of an array, or array.field of its records -> lowest and highest value; these
+            broadcast to it.
         """
         limits = {}
         for field in self.fields:
-            if field.values is not None:
-                high = field.values.high
+            for part, values in field.values.items():
+                high = values.high
                 last = np.asarray(sizes[high] - 1 if isinstance(high, str) else high)
                 behind = len(field.axes) + lanes - last.ndim
-                limits[field.name] = (field.values.low, last.reshape(last.shape + (1,) * behind))
+                name = f"{field.name}.{part}" if part else field.name
+                limits[name] = (values.low, last.reshape(last.shape + (1,) * behind))
         return limits
 
     def numba_type(self) -> Any:

@@ -13,6 +13,8 @@ from uas_coverage_env.autopilot.control import write_brake
 from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
+from uas_coverage_env.entities.commands import CLIMB, GO_TO, HOME, VELOCITY
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, ActionKind
 from uas_coverage_env.env.actions.acceleration import write as write_acceleration
 from uas_coverage_env.env.actions.velocity import write as write_velocity
@@ -32,8 +34,6 @@ from uas_coverage_env.env.memory import (
 )
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.commands import CLIMB, GO_TO, HOME, VELOCITY
-from uas_coverage_env.world.state import STATE
 
 _KIND = numbered(ACTION_NAMES, range(len(ACTIONS)))
 _OWN = len(ACTIONS)
@@ -182,7 +182,7 @@ def write_commands(arena, state, tables, learners, scratch, acting, on_gpu):
         values = scratch.values[i]
         command = scratch.commands[i]
         if rarely(which == _OWN):
-            if on_gpu is None and state.status[i] == FLYING:
+            if on_gpu is None and state.uas[i].status == FLYING:
                 _write_command(
                     acting.call[ADDRESS], arena, state, tables, learners, i, acting.parameters,
                     values, command,

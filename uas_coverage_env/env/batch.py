@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
-from uas_coverage_env.disturbances.act import disturbance_code
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions.given import accept_of_lanes
 from uas_coverage_env.env.batch_kernel import (
@@ -44,9 +44,9 @@ from uas_coverage_env.env.state_dict import by_present_names, check_like
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.simulation import swarm_state
+from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.state import STATE
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
 """When a mission that has ended begins anew."""
@@ -147,7 +147,7 @@ class CoverageBatch:
     @property
     def flying(self) -> NDArray[np.bool_]:
         """(L, U) which UAS fly now, an array of its own."""
-        return self.worlds.status == FLYING
+        return self.worlds.uas["status"] == FLYING
 
     def action_masks(self) -> NDArray[np.bool_]:
         """(L, U, choices) the choices that exist now."""
@@ -411,11 +411,9 @@ class CoverageBatch:
         goes_to = kind.goes_to or self.pool.goes_home
         called = assistants(settings.return_mode, settings.safety_filter, goes_to=goes_to)
         paying = paying_of(settings.reward, settings.weights)
-        nonlinear, pushed = (
-            settings.dynamics == "nonlinear",
-            disturbance_code(self.pool.disturbances),
-        )
-        rules = Rules(acting_of(kind), nonlinear, called, pushed, paying, self._observing)
+        nonlinear = settings.dynamics == "nonlinear"
+        code = feature_code(self.pool.features, nonlinear=nonlinear)
+        rules = Rules(acting_of(kind), nonlinear, called, code, paying, self._observing)
         # `_draw_next` comes between the end of a mission and the next
         begins_later = self._begins_here and self.autoreset == SAME_STEP
         autoreset = DISABLED if begins_later else self.autoreset

@@ -18,7 +18,6 @@ from uas_coverage_env.compiled.kernels import (
 )
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view, rows_view
-from uas_coverage_env.disturbances.act import begin_random
 from uas_coverage_env.env.act import acting_of, first_not_finite
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.batch_memory import (
@@ -58,6 +57,7 @@ from uas_coverage_env.env.pool import (
 )
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
+from uas_coverage_env.simulation.points import begin_features
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
 from uas_coverage_env.world import ABSENT, FLYING, SWAPPING
 from uas_coverage_env.world.arena import ARENA
@@ -89,7 +89,7 @@ def _copy(source, target):
 
 
 @rare_kernel
-def _begin_lane(pool, missions, lane, order, observation, width):
+def _begin_lane(pool, missions, code, lane, order, observation, width):
     """Begin a mission in a lane, as `Episode.reset` does for a single one."""
     lanes = missions.lanes
     s = order
@@ -104,10 +104,8 @@ def _begin_lane(pool, missions, lane, order, observation, width):
     state = state_of(missions.worlds, lane, pool.arenas, s)
     copy_arrays(start_of(pool.starts, s), state)
     arena = arena_of(pool.arenas, s)
-    begin_random(
-        arena.disturbances, state.disturbance_random, lanes.seed[lane], lanes.mission[lane]
-    )
     begin_events(arena, state, lanes.seed[lane], lanes.mission[lane])
+    begin_features(arena, state, code, lanes.seed[lane], lanes.mission[lane])
     first = first_learners_at(pool.learners, s)
     copy_arrays(first, learners_of(missions.learners, lane, pool.arenas, s))
     n_uas = first.report.shape[0]
@@ -116,7 +114,7 @@ def _begin_lane(pool, missions, lane, order, observation, width):
     _copy(seen, rows_view(observation, lane, seen.shape))
     report = missions.learners.report
     for i in range(n_uas, report.shape[1]):
-        missions.worlds.status[lane, i] = ABSENT
+        missions.worlds.uas[lane, i].status = ABSENT
         missions.learners.targets[lane, i] = NO_TARGET
         for k in range(K_WAYPOINTS):
             missions.learners.candidates[lane, i, k] = -1
@@ -146,7 +144,7 @@ def _add_up(worlds, lanes, learners, lane, max_steps):
     for i in range(lanes.rewards.shape[1]):
         lanes.rewards[lane, i] = 0.0
         if i < n_uas:
-            flies |= worlds.status[lane, i] in (FLYING, SWAPPING)
+            flies |= worlds.uas[lane, i].status in (FLYING, SWAPPING)
             lanes.rewards[lane, i] = amounts[i, REWARD]
     swarm = rows_view(lanes.swarm, lane, (lanes.swarm.shape[1],))
     # sums in variables: memory that has just been written is read late
@@ -175,12 +173,12 @@ def _keep_last_looks(worlds, settled, lane, n_uas, before, observation, width):
     Two arrays take turns: once it lies in both, nothing has to be copied any more.
     """
     for i in range(observation.shape[1]):
-        flies = i < n_uas and worlds.status[lane, i] == FLYING
+        flies = i < n_uas and worlds.uas[lane, i].status == FLYING
         if not flies and not settled[lane, i]:
             for k in range(width):
                 observation[lane, i, k] = before[lane, i, k]
         # one that swaps packs looks around
-        settled[lane, i] = not flies and (i >= n_uas or worlds.status[lane, i] != SWAPPING)
+        settled[lane, i] = not flies and (i >= n_uas or worlds.uas[lane, i].status != SWAPPING)
 
 
 @inlined_kernel
@@ -191,7 +189,7 @@ def _fetch_ahead(state, learners, observation):
     """
     prefetch(learners.around)
     for i in range(observation.shape[0]):
-        if state.status[i] == FLYING:
+        if state.uas[i].status == FLYING:
             prefetch(observation[i])
 
 
@@ -295,7 +293,7 @@ def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
         max_steps = arena.rules[0].max_steps
         state = state_of(missions.worlds, lane, pool.arenas, s)
         learners = learners_of(missions.learners, lane, pool.arenas, s)
-        n_uas = state.status.shape[0]
+        n_uas = state.uas.shape[0]
         rows = rows_view(observation, lane, (n_uas, width))
         _fetch_ahead(state, learners, rows)
         _keep_last_looks(missions.worlds, missions.settled, lane, n_uas, before, observation, width)
@@ -311,7 +309,7 @@ def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
             begins = True
             order = DRAW
     if rarely(begins):
-        _begin_lane(pool, missions, lane, order, observation, width)
+        _begin_lane(pool, missions, rules.code, lane, order, observation, width)
 
 
 def _lane_types() -> tuple[types.Type, ...]:

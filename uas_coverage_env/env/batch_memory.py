@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.memory import LEARNERS, REPORT_SIZE, SCRATCH, Learners, Scratch
 from uas_coverage_env.env.observation import K_WAYPOINTS
 from uas_coverage_env.world import FLYING, WorldState
-from uas_coverage_env.world.state import STATE
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)
 """When a mission that has ended begins anew: in the next step, in the same, or never by itself."""
@@ -103,7 +103,7 @@ def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missi
         np.zeros((num_envs, sizes["U"]), dtype=np.bool_),
     )
     seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)
-    missions.worlds.status[:] = FLYING
+    missions.worlds.uas["status"][:] = FLYING
     missions.lanes.seed[:] = seeds
     missions.lanes.mission[:] = missions.lanes.changes[:] = -1
     missions.lanes.orders[:] = FLY

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.batch_memory import LANES
 from uas_coverage_env.env.drawn import DrawnMission, DrawnPool
 from uas_coverage_env.env.memory import LEARNERS
@@ -13,7 +14,6 @@ from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.scenes import scenes_in
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world.state import STATE
 
 
 def checked(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.entities.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH, Mode
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote, write_commands
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, SCRATCH
@@ -17,7 +18,6 @@ from uas_coverage_env.env.start import learners_sizes, tables_of
 from uas_coverage_env.mission import MissionBrief, WorldView
 from uas_coverage_env.world import FLYING, Acceleration, Command, GoTo, SwarmState, Velocity, Wrench
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH, Mode
 
 
 @kernel
@@ -69,7 +69,7 @@ class Cockpit:
             self._view.arena, state, self._tables, learners, self._observing, self._flew,
             self._observation,
         )  # fmt: skip
-        self._flew = state.status == FLYING
+        self._flew = state.uas["status"] == FLYING
         return self._observation.copy()
 
     def action_masks(self) -> NDArray[np.int8]:

@@ -107,8 +107,8 @@ class CudaMissions:
                 f'not run on a GPU; let them do another thing (then = "hover")'
             )
         acting = acting_of(given.kind, on_gpu=True)
-        acts = tuple(disturbance.act for disturbance in pool.disturbances)
-        self._launched = step_with(given.kind.write if is_own(acting) else None, acts)
+        write_own = given.kind.write if is_own(acting) else None
+        self._launched = step_with(write_own, pool.features, given.dynamics == "nonlinear")
         paying = paying_of(DEFAULT_REWARD, given.weights)
         observing = observing_of(OBSERVATION)
         self._pool = pool
@@ -121,7 +121,6 @@ class CudaMissions:
             on_device(paying),
             on_device(observing),
             self.missions,
-            given.dynamics == "nonlinear",
         )
 
     def step(self, asked: Any = None) -> None:

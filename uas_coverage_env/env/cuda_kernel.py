@@ -11,10 +11,9 @@ import numpy as np
 from numba import cuda
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.views import copy_arrays, lane_view
-from uas_coverage_env.disturbances.act import begin_random
-from uas_coverage_env.disturbances.on_gpu import are_own, disturb_with
+from uas_coverage_env.entities.state import STATE, as_observed
 from uas_coverage_env.env.act import (
     begin_command,
     first_not_finite,
@@ -39,18 +38,14 @@ from uas_coverage_env.env.pool import (
     learners_of,
     tables_at,
 )
+from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.simulation.flight import check_all, fly_still, move_all, write_all_inputs
+from uas_coverage_env.simulation.on_gpu import called_at, called_at_begin
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
-from uas_coverage_env.simulation.step import (
-    begin_step,
-    carry_out,
-    judge,
-    move_all,
-    write_all_inputs,
-)
+from uas_coverage_env.simulation.step import begin_step, judge
 from uas_coverage_env.world import FLYING, SWAPPING, WorldState
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.events import begin_events, heed
-from uas_coverage_env.world.state import STATE, as_told
+from uas_coverage_env.world.events import begin_events
 
 
 class Missions(NamedTuple):
@@ -88,15 +83,15 @@ _look_of = lane_view(FIRST_OBSERVATION, sized_by=ARENA)
 def _is_due(state):
     """Whether anything happens at this sample that may change the scene."""
     due = False
-    for e in range(state.event_step.shape[0]):
-        due |= state.event_step[e] == state.step[0]
+    for e in range(state.events.shape[0]):
+        due |= state.events[e].step == state.step[0]
     for w in range(state.due_step.shape[0]):
         due |= state.due_step[w] == state.step[0]
     return due
 
 
-@kernel
-def _flies(pool, missions, lane):
+@inlined_kernel
+def _flies(pool, missions, begin, lane):
     """Whether a lane flies in this step: it refuses an action, or begins a mission, where not."""
     learners = learners_of(missions.learners, lane, pool.arenas, missions.scene[lane, 0])
     missions.due[lane] = False
@@ -104,13 +99,13 @@ def _flies(pool, missions, lane):
     if missions.refused[lane]:
         return False
     if missions.ended[lane]:
-        _begin(pool, missions, lane)
+        _begin(pool, missions, begin, lane)
         return False
     return True
 
 
-@kernel
-def _begin(pool, missions, lane):
+@inlined_kernel
+def _begin(pool, missions, begin, lane):
     """Begin the next mission of a lane."""
     missions.ended[lane] = False
     missions.mission[lane] += 1
@@ -120,13 +115,13 @@ def _begin(pool, missions, lane):
     arena, state = arena_of(pool.arenas, 0), state_of(missions.worlds, lane, pool.arenas, 0)
     copy_arrays(start_of(pool.starts, 0), state)
     seed, mission = missions.seed[lane], missions.mission[lane]
-    begin_random(arena.disturbances, state.disturbance_random, seed, mission)
     begin_events(arena, state, seed, mission)
+    begin(arena, state, seed, mission)
     learners = learners_of(missions.learners, lane, pool.arenas, 0)
     copy_arrays(first_learners_at(pool.learners, 0), learners)
     seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
     copy_arrays(first_observation_at(pool.first_observations, 0), seen)
-    for i in range(state.status.shape[0]):
+    for i in range(state.uas.shape[0]):
         missions.rewards[lane, i] = 0.0
 
 
@@ -138,11 +133,9 @@ def _decide(pool, acting, missions, lane):
     learners = learners_of(missions.learners, lane, pool.arenas, scene)
     scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
     arena, tables = arena_of(pool.arenas, scene), tables_at(pool.tables, scene)
-    seen = as_told(arena, state)
+    seen = as_observed(state)
     write_commands(arena, seen, tables, learners, scratch, acting, True)
     begin_step(state, scratch.commands, scratch.outcome)
-    if arena.rules[0].eventful:
-        heed(arena, state, scratch.outcome)
 
 
 @kernel
@@ -156,7 +149,7 @@ def _finish(pool, paying, observing, missions, lane):
     seen = _look_of(missions.first_observations, lane, pool.arenas, scene)
     finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
     flies = False
-    for i in range(state.status.shape[0]):
+    for i in range(state.uas.shape[0]):
         missions.rewards[lane, i] = learners.amounts[i, REWARD]
         missions.acted[lane] += scratch.outcome[i].flew
         status = learners.report[i, STATUS]
@@ -186,73 +179,78 @@ def _write_with(write: Any) -> Any:
         scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
         if missions.ended[lane] or first_not_finite(learners.asked) != ACCEPTED:
             return
-        for i in range(state.status.shape[0]):
+        for i in range(state.uas.shape[0]):
             begin_command(tables, learners, scratch, acting, i)
-            if state.status[i] == FLYING:
+            if state.uas[i].status == FLYING:
                 command = scratch.commands[i]
                 values = scratch.values[i]
-                seen = as_told(arena, state)
+                seen = as_observed(state)
                 write(arena, seen, tables, learners, i, acting.parameters, values, command)
                 refuse_unflyable(arena, learners, acting, i, command)
 
     return write_own
 
 
-@kernel
-def _fly_as_usual(pool, missions, nonlinear, lane):
-    """Fly and judge a step, with the disturbances of the package."""
-    scene = missions.scene[lane, 0]
-    state = state_of(missions.worlds, lane, pool.arenas, scene)
-    scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
-    carry_out(arena_of(pool.arenas, scene), state, nonlinear, None, scratch.outcome)
-
-
 @cache  # to compile it again takes seconds
-def _fly_with(kernels: tuple[Any, ...]) -> Any:
-    """The same with disturbances of one's own, of which these are the kernels."""
-    disturb = disturb_with(kernels)
+def _fly_with(features: tuple[Feature, ...], nonlinear: bool) -> Any:
+    """Fly and judge a step with what the features do."""
+    command, act, moved, judged, sensed = (
+        called_at(point, features) for point in Point if point != Point.BEGIN
+    )
+    otherwise = nonlinear or any(feature.disturbs for feature in features)
 
     @kernel
-    def fly_disturbed(pool, missions, nonlinear, lane):
+    def fly_step(pool, missions, lane):
         scene = missions.scene[lane, 0]
         arena = arena_of(pool.arenas, scene)
         state = state_of(missions.worlds, lane, pool.arenas, scene)
-        scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
-        write_all_inputs(arena, state, nonlinear, scratch.outcome)
-        disturb(arena, state, scratch.outcome)
-        move_all(arena, state, nonlinear, scratch.outcome)
-        judge(arena, state, nonlinear, scratch.outcome)
+        outcome = _scratch_of(missions.scratch, lane, pool.arenas, scene).outcome
+        command(arena, state, outcome)
+        if otherwise:
+            if arena.rules[0].disturbed:
+                write_all_inputs(arena, state, nonlinear, outcome)
+                act(arena, state, outcome)
+                check_all(arena, state, outcome)
+            move_all(arena, state, nonlinear, outcome)
+        else:
+            fly_still(arena, state, outcome)
+        moved(arena, state, outcome)
+        judge(arena, state, nonlinear, outcome)
+        judged(arena, state, outcome)
+        sensed(arena, state, outcome)
 
-    return fly_disturbed
+    return fly_step
 
 
 @cache
-def _step_of(write: Any, fly: Any) -> Any:
+def _step_of(write: Any, begin: Any, fly: Any) -> Any:
     """The step of all lanes, made of these functions."""
 
     @cuda.jit
-    def step(pool, acting, paying, observing, missions, nonlinear):
+    def step(pool, acting, paying, observing, missions):
         lane = cuda.grid(1)  # pyrefly: ignore[missing-argument]
         if lane < missions.ended.shape[0]:
             write(pool, acting, missions, lane)
-            if _flies(pool, missions, lane):
+            if _flies(pool, missions, begin, lane):
                 _decide(pool, acting, missions, lane)
-                fly(pool, missions, nonlinear, lane)
+                fly(pool, missions, lane)
                 _finish(pool, paying, observing, missions, lane)
 
     return step
 
 
-def step_with(write: Any, acts: tuple[Any, ...]) -> Any:
+def step_with(write: Any, features: tuple[Feature, ...], nonlinear: bool) -> Any:
     """The step of all lanes, to be launched.
 
     Args:
         write: The kernel of a kind of action of one's own; None: it is one of the package.
-        acts: The kernels of the disturbances.
+        features: What the mission has of what few missions have.
+        nonlinear: Whether the 6-DOF plant is flown.
     """
     return _step_of(
         _write_as_usual if write is None else _write_with(write),
-        _fly_with(acts) if are_own(acts) else _fly_as_usual,
+        called_at_begin(features),
+        _fly_with(features, nonlinear),
     )
 
 
@@ -280,11 +278,15 @@ def new_missions(pool: ScenarioPool, num_envs: int, seed: int) -> Missions:
         np.zeros((num_envs, sizes["changes"]), dtype=np.int64),
         np.zeros(num_envs, dtype=np.bool_),
     )
-    _begin_all(pool.arrays, missions)
+    _begin_all(called_at_begin(pool.features))(pool.arrays, missions)
     return missions
 
 
-@kernel
-def _begin_all(pool, missions):
-    for lane in range(missions.ended.shape[0]):
-        _begin(pool, missions, lane)
+@cache
+def _begin_all(begin: Any) -> Any:
+    @kernel
+    def begin_all(pool, missions):
+        for lane in range(missions.ended.shape[0]):
+            _begin(pool, missions, begin, lane)
+
+    return begin_all

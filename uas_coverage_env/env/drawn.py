@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.compiled.slots import Slots
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES, Tables
 from uas_coverage_env.env.pool import MissionPool, ScenarioPool
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_values
+from uas_coverage_env.features.feature import fitted_to, in_slots, memory_words
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.simulation.scenes import changes_scene
 from uas_coverage_env.world.arena import ARENA, Arena
-from uas_coverage_env.world.disturbance import fitted_to, in_slots
-from uas_coverage_env.world.events import goes_home, is_eventful
+from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.packs import swaps_alone
-from uas_coverage_env.world.state import STATE
+from uas_coverage_env.world.sensing import senses
 
 _MEMORIES: tuple[Memory[Any], ...] = (ARENA, STATE, TABLES, LEARNERS, FIRST_OBSERVATION)
 _WORDS = 6
@@ -43,7 +44,7 @@ class DrawnPool:
         scenarios: (L,) what the lanes fly, as it is now; before their first missions an example.
         actions: The kind of action.
         sizes: The largest that the arrays of a lane may need.
-        disturbances: One of each kind that may act: of those in `source.examples`.
+        features: One of each kind that there may be: of those in `source.examples`.
         goes_home: Whether an event may send a UAS home, in any of `source.examples`.
         changes: Whether the scene of any of `source.examples` may change.
         drawn_from: (L, 6) states of the generators from which the missions now flown were drawn;
@@ -53,16 +54,16 @@ class DrawnPool:
     def __init__(self, source: MissionSource, settings: MissionSettings, num_envs: int) -> None:
         self.settings = settings
         self._source = source
-        acting = [settings.disturbances_in(scenario) for scenario in source.examples]
-        self.disturbances, _ = in_slots(acting)
+        self.features, _ = in_slots([settings.features_in(each) for each in source.examples])
         self.goes_home = any(goes_home(scenario) for scenario in source.examples)
-        example = ScenarioPool(source.example, settings, self.disturbances)
+        example = ScenarioPool(source.example, settings, self.features)
         self.scenarios = [example.scenarios[0]] * num_envs
         self.actions = example.actions
         self.sizes = {**example.sizes, "U": source.room.n_uas, "W": source.room.n_waypoints}
         self.sizes["E"] = max(len(scenario.events) for scenario in source.examples)
-        eventful = any(is_eventful(scenario) for scenario in source.examples)
-        self.sizes["S"] = source.room.n_uas if eventful else 0
+        sensed = any(senses(scenario) for scenario in source.examples)
+        self.sizes["S"] = source.room.n_uas if sensed else 0
+        self.sizes["memory words"] = memory_words(self.features, source.room.n_uas)
         swaps = any(swaps_alone(scenario) for scenario in source.examples)
         self.sizes["B"] = source.room.n_uas if swaps else 0
         repeats = any(scenario.asks_again for scenario in source.examples)
@@ -124,14 +125,14 @@ class DrawnPool:
             scenario = chosen[lane] if chosen else None
             before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
             scenario = scenario or self._source.draw(rng)
-            fitted_to(self.disturbances, self.settings.disturbances_in(scenario))
+            fitted_to(self.features, self.settings.features_in(scenario))
             self._check_events(scenario)
             missions.append(DrawnMission(lane, scenario, before, rng))
         self.install(missions)
 
     def _check_events(self, scenario: Scenario) -> None:
         """Refuse more events, or others, than there is room for."""
-        n_events, n_sensed = len(scenario.events), len(scenario.uas) * is_eventful(scenario)
+        n_events, n_sensed = len(scenario.events), len(scenario.uas) * senses(scenario)
         if (
             n_events > self.sizes["E"]
             or n_sensed > self.sizes["S"]
@@ -197,7 +198,7 @@ class DrawnPool:
     def install(self, missions: Sequence["DrawnMission"]) -> None:
         """Put missions into the slots of their lanes."""
         for lane, scenario, before, rng in missions:
-            pool = ScenarioPool(scenario, self.settings, self.disturbances)
+            pool = ScenarioPool(scenario, self.settings, self.features)
             for memory, slots, arrays in zip(_MEMORIES, self._slots, pool.arrays, strict=True):
                 slots.put(lane, memory.mission(arrays, 0))
             self.scenarios[lane] = pool.scenarios[0]

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import machine_code
-from uas_coverage_env.disturbances.act import disturbance_code
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.express import Moment
@@ -27,6 +26,7 @@ from uas_coverage_env.env.start import (
 )
 from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
+from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
@@ -74,7 +74,7 @@ class Episode:
             return_mode=settings.return_mode,
             safety_filter=settings.safety_filter,
             measured_m=0.0,  # only what counts: nothing more is told
-            disturbances=settings.disturbances_in(scenario),
+            disturbances=settings.disturbances,
             judges_wrenches=True,
         )
         self.names = self._world.names
@@ -127,8 +127,10 @@ class Episode:
         goes_to = kind.goes_to or goes_home(self.scenario)
         called = assistants(world.return_mode, world.safety_filter, goes_to=goes_to)
         # what the kernel is given in every step: the arrays are written in place
-        at = np.array([*addresses, *disturbance_code(world.disturbances), *called])
-        self._given = (at, world.dynamics == "nonlinear")
+        nonlinear = world.dynamics == "nonlinear"
+        code = feature_code(world.features, nonlinear=nonlinear)
+        at = np.array([*addresses, len(called), *called, *code])
+        self._given = (at, nonlinear)
         seen = self.observation
         # to assign a record field by field takes ten times as long
         self._scratch_bytes = [array.view(np.uint8) for array in self._scratch]
@@ -209,7 +211,7 @@ class Episode:
         sample = min(self.steps, len(self._world.arena.moving_path_m) - 1)
         return global_state(
             self._own(),
-            state.status,
+            state.uas["status"],
             state.uncovered,
             self._world.arena.moving_path_m[sample],
             self._world.arena.moving_velocity_mps[sample],
@@ -226,7 +228,7 @@ class Episode:
         world = self._world
         own = np.zeros((len(self.names), OWN.size), np.float32)
         observes = np.ones(len(self.names), dtype=np.bool_)
-        arrays = (world.arena, world.state.as_told(), self.tables, self._learners)
+        arrays = (world.arena, world.state.as_observed(), self.tables, self._learners)
         observe(*arrays, observing_of([OWN]), observes, own)
         return own
 
@@ -242,5 +244,5 @@ class Episode:
     def moment(self) -> Moment:
         """The mission now, for `express`."""
         world = self._world
-        arrays = (world.arena, world.state.as_told(), self.tables, self._learners)
+        arrays = (world.arena, world.state.as_observed(), self.tables, self._learners)
         return Moment(self.names, *arrays, world.dynamics == "nonlinear")

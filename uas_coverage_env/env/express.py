@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import velocity_of
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.actions import Actions
 from uas_coverage_env.env.drawn import DrawnPool
 from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Tables
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.world import FLYING, Arena, Command, GoTo, WorldState, pack
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.state import STATE
 
 _ROUNDING = 1e-9
 """A number this far beyond its range, as a share of it, is at the end of it."""
@@ -49,7 +49,7 @@ def moment_of(
     return Moment(
         tuple(uas.name for uas in pool.scene_of(s).uas),
         arena,
-        STATE.lane(worlds, lane, sizes).as_told(),
+        STATE.lane(worlds, lane, sizes).as_observed(),
         TABLES.mission(pool.arrays.tables, s),
         LEARNERS.lane(learners, lane, sizes),
         pool.settings.dynamics == "nonlinear",
@@ -76,7 +76,7 @@ def action_of(actions: Actions, moment: Moment, name: str, command: Command, cli
     if name not in moment.names:
         raise ValueError(f"there is no agent {name!r}: {', '.join(moment.names)}")
     i = moment.names.index(name)
-    if state.status[i] != FLYING:
+    if state.uas[i].status != FLYING:
         raise ValueError(f"{name} does not fly any more; remove its command {command}")
     pack({name: command}, [name], [name], len(state.uncovered))  # refuses what is none
     try:
@@ -140,7 +140,7 @@ def joint_action_of(
     choice = actions.kind.choices > 0
     joint = np.zeros(rows if choice else (rows, actions.size), np.int64 if choice else np.float32)
     for i, name in enumerate(moment.names):
-        if name not in commands and moment.state.status[i] == FLYING:
+        if name not in commands and moment.state.uas[i].status == FLYING:
             raise ValueError(f"{name} has no command; give one for each UAS that flies")
     for name, command in commands.items():
         action = action_of(actions, moment, name, command, clip)

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
+from uas_coverage_env.entities.state import SWAPPING, as_observed
 from uas_coverage_env.env.act import first_not_finite, write_commands
 from uas_coverage_env.env.memory import (
     CONTACT,
@@ -26,7 +27,6 @@ from uas_coverage_env.env.observe import observe_one
 from uas_coverage_env.env.reward_kernel import compute_rewards
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.world import FLYING
-from uas_coverage_env.world.state import SWAPPING, as_told
 
 ACCEPTED = -1
 
@@ -39,8 +39,8 @@ class Rules(NamedTuple):
     """Whether the 6-DOF plant is flown."""
     assistants: Any
     """Which help to fly, see `autopilot.assist`."""
-    disturbances: Any
-    """What pushes back, likewise."""
+    code: Any
+    """What features do, see `simulation.points.FeatureCode`."""
     paying: Paying
     observing: Observing
 
@@ -59,7 +59,7 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         report[i, CONTACT] = event.contact
         report[i, CONTACT_WITH] = event.contact_with
         report[i, LIMITS] = event.limits_exceeded
-        report[i, STATUS] = state.status[i]
+        report[i, STATUS] = state.uas[i].status
         report[i, FILTERED] = event.filtered
         report[i, RETURNING] = event.returning
         report[i, COVERED] += newly_covered
@@ -70,13 +70,13 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         amounts[i, REWARD] = reward
     if newly_covered > 0:
         write_around(state.uncovered, tables.neighbours, learners.around)
-    seen = as_told(arena, state)
+    seen = as_observed(state)
     for i in range(report.shape[0]):
         flew = outcome[i].flew
-        if rarely(not flew and state.status[i] == FLYING):
+        if rarely(not flew and state.uas[i].status == FLYING):
             # where it was to go before it swapped packs is forgotten
             learners.targets[i] = NO_TARGET
-        if flew or state.status[i] == FLYING or state.status[i] == SWAPPING:
+        if flew or state.uas[i].status == FLYING or state.uas[i].status == SWAPPING:
             observe_one(arena, seen, tables, learners, observing, i, observation[i], on_gpu)
 
 
@@ -93,10 +93,10 @@ def step_learners(arena, state, tables, learners, scratch, rules, observation):
         rules: `Rules`.
         observation: (U, V) float32; that of a UAS that did not fly stays.
     """
-    seen = as_told(arena, state)
+    seen = as_observed(state)
     write_commands(arena, seen, tables, learners, scratch, rules.acting, None)
     advance(
-        arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.disturbances,
+        arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.code,
         scratch.outcome,
     )  # fmt: skip
     finish_step(
@@ -115,8 +115,8 @@ def step_episode(at, nonlinear, before, observation):
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
 
     Args:
-        at: Where the arrays of `EPISODE` lie, then the disturbances, then the assistants: to hand
-            over every array would take longer than the flight of a UAS.
+        at: Where the arrays of `EPISODE` lie, then number and addresses of the assistants, then
+            what features do: to hand over every array would take longer than the flight of a UAS.
         nonlinear: See `Rules`.
         before: (U, V) float32, the observation of the step before.
         observation: (U, V) float32, another array; written.
@@ -129,13 +129,12 @@ def step_episode(at, nonlinear, before, observation):
     if invalid != ACCEPTED:
         return invalid
     for i in range(observation.shape[0]):
-        if state.status[i] != FLYING:
+        if state.uas[i].status != FLYING:
             for k in range(observation.shape[1]):
                 observation[i, k] = before[i, k]
-    n_called = 1 + arena.disturbances.shape[0]
-    disturbances = slice_view(at, _N_NUMBERS, n_called)
-    first = _N_NUMBERS + n_called
-    assistants = slice_view(at, first, at.shape[0] - first)
-    rules = Rules(acting, nonlinear, assistants, disturbances, paying, observing)
+    assistants = slice_view(at, _N_NUMBERS + 1, at[_N_NUMBERS])
+    first = _N_NUMBERS + 1 + at[_N_NUMBERS]
+    code = slice_view(at, first, at.shape[0] - first)
+    rules = Rules(acting, nonlinear, assistants, code, paying, observing)
     step_learners(arena, state, tables, learners, scratch, rules, observation)
     return ACCEPTED

@@ -9,6 +9,7 @@ from numba import types
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.memory import (
     BLOCK_ADDRESS,
     BLOCK_COLUMN,
@@ -30,7 +31,6 @@ from uas_coverage_env.env.observation.remaining import write_remaining
 from uas_coverage_env.env.observation.surroundings import write_surroundings
 from uas_coverage_env.env.observation.waypoints import write_waypoints
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.state import STATE
 
 _AT = firsts_of(OBSERVATION)
 _SIZE = type(_AT)(*(block.size for block in OBSERVATION))
@@ -135,6 +135,6 @@ def observe(arena, state, tables, learners, observing, observes, observation):
         observes: (U,) which.
         observation: (U, V) float32; written.
     """
-    for i in range(state.status.shape[0]):
+    for i in range(state.uas.shape[0]):
         if observes[i]:
             observe_one(arena, state, tables, learners, observing, i, observation[i], None)

@@ -61,7 +61,7 @@ class Observer:
         state = self._view.state
         write_around(state.uncovered, self._tables.neighbours, self._learners.around)
         self._learners.targets[:] = NO_TARGET if targets is None else targets
-        flying = state.status == FLYING
+        flying = state.uas["status"] == FLYING
         observe(
             self._view.arena, state, self._tables, self._learners, self._observing, flying,
             self._observation,

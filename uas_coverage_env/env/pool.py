@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.compiled.views import lane_view, pool_view
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.memory import (
     FIRST_OBSERVATION,
@@ -21,13 +22,12 @@ from uas_coverage_env.env.memory import (
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
+from uas_coverage_env.features.feature import Feature, fitted_to, in_slots
 from uas_coverage_env.scenario import Room, Scenario, loaded_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.simulation.scenes import changes_scene
 from uas_coverage_env.world.arena import ARENA, Arena, build_arena
-from uas_coverage_env.world.disturbance import Disturbance, fitted_to, in_slots
 from uas_coverage_env.world.events import goes_home
-from uas_coverage_env.world.state import STATE
 
 MEASURED_M = 0.0
 """Only what counts: nothing more is told."""
@@ -36,7 +36,7 @@ MEASURED_M = 0.0
 def scene_arrays(
     known: Scenario,
     settings: MissionSettings,
-    disturbances: Sequence[Disturbance],
+    features: Sequence[Feature],
     before: Tables,
 ) -> tuple[Arena, Tables]:
     """The arrays of a mission whose scene has changed.
@@ -44,11 +44,11 @@ def scene_arrays(
     Args:
         known: The scenario from now on.
         settings: How missions are flown and paid.
-        disturbances: One of each kind in the pool.
+        features: One of each kind in the pool.
         before: The tables of the scene before.
     """
-    slots = fitted_to(disturbances, settings.disturbances_in(known))
-    arena = build_arena(known, measured_m=MEASURED_M, disturbances=slots, judges_wrenches=True)
+    slots = fitted_to(features, settings.features_in(known))
+    arena = build_arena(known, measured_m=MEASURED_M, features=slots, judges_wrenches=True)
     return arena, tables_of(known, before.ranges)
 
 
@@ -87,7 +87,7 @@ class ScenarioPool:
         scenario: Name of a shipped scenario, path of a scenario file, or a scenario; or a
             sequence of these.
         settings: How missions are flown and paid; None: as usual.
-        disturbances: One of each kind that there is to be room for; None: those that act.
+        features: One of each kind that there is to be room for; None: those that there are.
         lanes: How many fly them: each may get a scene of its own, behind the missions.
 
     Attributes:
@@ -98,7 +98,7 @@ class ScenarioPool:
         sizes: The largest of every named size.
         n_uas: (S,).
         n_waypoints: (S,).
-        disturbances: One of each kind that acts in any of the scenarios.
+        features: One of each kind that any of the scenarios has.
         goes_home: Whether an event of any of them may send a UAS home.
         changes: Whether the scene of any of them may change.
 
@@ -110,7 +110,7 @@ class ScenarioPool:
         self,
         scenario: str | Path | Scenario | Sequence[str | Path | Scenario],
         settings: MissionSettings | None = None,
-        disturbances: Sequence[Disturbance] | None = None,
+        features: Sequence[Feature] | None = None,
         *,
         lanes: int = 0,
     ) -> None:
@@ -124,12 +124,12 @@ class ScenarioPool:
         self.scenarios = tuple(settings.limited(loaded_scenario(entry)) for entry in given)
         self.goes_home = any(goes_home(scenario) for scenario in self.scenarios)
         self.changes = any(changes_scene(scenario) for scenario in self.scenarios)
-        acting = [settings.disturbances_in(scenario) for scenario in self.scenarios]
-        if disturbances is None:
-            self.disturbances, slots = in_slots(acting)
+        owned = [settings.features_in(scenario) for scenario in self.scenarios]
+        if features is None:
+            self.features, slots = in_slots(owned)
         else:
-            self.disturbances = tuple(disturbances)
-            slots = [fitted_to(disturbances, own) for own in acting]
+            self.features = tuple(features)
+            slots = [fitted_to(features, own) for own in owned]
         worlds = pool_worlds(
             self.scenarios, measured_m=MEASURED_M, slots=slots, judges_wrenches=True
         )

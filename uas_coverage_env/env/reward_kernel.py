@@ -11,6 +11,7 @@ from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.memory import (
     FIRST_TERM,
     LEARNERS,
@@ -25,7 +26,6 @@ from uas_coverage_env.env.memory import (
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm
 from uas_coverage_env.env.rewards import terms as default
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.state import STATE
 
 _AT = numbered(REWARD_TERMS, range(len(REWARD)))
 

@@ -6,16 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import STATE, WorldState
 from uas_coverage_env.env.batch_memory import Missions
 from uas_coverage_env.env.drawn import DrawnPool
 from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Observing, Tables
 from uas_coverage_env.env.pool import ScenarioPool, scene_arrays
 from uas_coverage_env.env.start import observe_scene
+from uas_coverage_env.features.event import OfUas
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.scenario.events import OfUas
 from uas_coverage_env.simulation.scenes import carried_over, changes_due, scene_after
 from uas_coverage_env.world.arena import ARENA, Arena
-from uas_coverage_env.world.state import STATE, WorldState
 
 
 class SceneLane(NamedTuple):
@@ -48,7 +48,7 @@ def change_scenes(
         observation: (L, U, V); written where a scene changes.
     """
     worlds, learners, lanes = missions.worlds, missions.learners, missions.lanes
-    happens = (worlds.event_step == worlds.step).any(axis=1)
+    happens = (worlds.events["step"] == worlds.step).any(axis=1)
     again = (worlds.due_step == worlds.step).any(axis=1)
     scenes = SceneChanges(pool, observing)
     for k in np.flatnonzero(flew & (happens | again)).tolist():
@@ -110,7 +110,12 @@ class SceneChanges:
         events = [change for change in changes if change < len(known.events)]
         of_uas = [e for e in events if isinstance(known.events[e], OfUas)]
         # lanes whose scenes have been equal so far share one scenario
-        key = id(known), int(state.step[0]), tuple(changes), tuple(state.event_uas[of_uas].tolist())
+        key = (
+            id(known),
+            int(state.step[0]),
+            tuple(changes),
+            tuple(state.events["uas"][of_uas].tolist()),
+        )
         if key not in self._made:
             for change in changes:
                 known = scene_after(known, change, state)
@@ -121,7 +126,7 @@ class SceneChanges:
 def _laid_out(pool: ScenarioPool | DrawnPool, scene: int, known: Scenario) -> tuple[Arena, Tables]:
     """The arrays of what the scene of a mission has become, which was this one of the pool."""
     before = TABLES.mission(pool.arrays.tables, scene)
-    return scene_arrays(known, pool.settings, pool.disturbances, before)
+    return scene_arrays(known, pool.settings, pool.features, before)
 
 
 def scenes_in(
@@ -157,9 +162,9 @@ def _scene_after_all(
         possible = change not in changes[:k]
         if 0 <= change < n_events:
             event = known.events[change]
-            possible &= event.changes_scene and 1 <= state.event_step[change] <= state.step[0]
+            possible &= event.changes_scene and 1 <= state.events[change].step <= state.step[0]
             of_uas = isinstance(event, OfUas)
-            possible &= not of_uas or 0 <= state.event_uas[change] < len(known.uas)
+            possible &= not of_uas or 0 <= state.events[change].uas < len(known.uas)
         else:
             w = change - n_events
             possible &= 0 <= w < len(known.waypoints) and bool(known.waypoints[w].again_after_s)

@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.blocks import checked_blocks
-from uas_coverage_env.disturbances import Disturbance
-from uas_coverage_env.disturbances.of_scenario import disturbances_in
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, observation_named
 from uas_coverage_env.env.rewards import REWARD, RewardTerm, weights_of
+from uas_coverage_env.features.feature import Feature, checked_features
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
-from uas_coverage_env.world.disturbance import checked_disturbances
+from uas_coverage_env.world.packs import mission_features
 
 _LONGEST = 100_000
 _SWITCHES = ("return_mode", "safety_filter", "mask_in_observation", "images_apart", "flat_infos")
@@ -67,7 +66,7 @@ class MissionSettings:
     max_cycles: int | None = None
     observation: tuple[ObservationBlock, ...] = OBSERVATION
     reward: tuple[RewardTerm, ...] = REWARD
-    disturbances: tuple[Disturbance, ...] | None = None
+    disturbances: tuple[Feature, ...] | None = None
     mask_in_observation: bool = False
     images_apart: bool = False
     flat_infos: bool = False
@@ -106,7 +105,7 @@ class MissionSettings:
         )
         weights_of(self.reward, self.reward_weights)
         if self.disturbances is not None:
-            object.__setattr__(self, "disturbances", checked_disturbances(self.disturbances))
+            object.__setattr__(self, "disturbances", checked_features(self.disturbances))
 
     @classmethod
     def of(cls, given: Mapping[str, Any], beside: Sequence[str] = ()) -> "MissionSettings":
@@ -161,9 +160,9 @@ class MissionSettings:
         """Whether the action is a choice."""
         return self.kind.choices > 0
 
-    def disturbances_in(self, scenario: Scenario) -> tuple[Disturbance, ...]:
-        """What pushes back in the missions of a scenario."""
-        return disturbances_in(scenario, self.disturbances)
+    def features_in(self, scenario: Scenario) -> tuple[Feature, ...]:
+        """What the missions of a scenario have of what few have."""
+        return mission_features(scenario, self.disturbances)
 
     def limited(self, scenario: Scenario) -> Scenario:
         """The scenario with this time limit; return mode and the observed time know it."""

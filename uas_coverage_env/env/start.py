@@ -67,7 +67,7 @@ def first_observation(
     learners.targets[:] = NO_TARGET
     learners.candidates[:] = -1
     learners.report[:, CONTACT_WITH] = -1
-    learners.report[:, STATUS] = state.status
+    learners.report[:, STATUS] = state.uas["status"]
     learners.report[:, COVERED] = (~state.uncovered).sum()
     first = FIRST_OBSERVATION.zeros(sizes)
     observe_scene(arena, state, tables, learners, observing, first.observation)
@@ -93,5 +93,5 @@ def observe_scene(
         observation: (U, V); the rows of UAS that fly are written.
     """
     write_around(state.uncovered, tables.neighbours, learners.around)
-    flying = state.status == FLYING
-    observe(arena, state.as_told(), tables, learners, observing, flying, observation)
+    flying = state.uas["status"] == FLYING
+    observe(arena, state.as_observed(), tables, learners, observing, flying, observation)

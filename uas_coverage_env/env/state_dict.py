@@ -1,6 +1,6 @@
 """Arrays of a checkpoint that are loaded: checked, since kernels check no index."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -36,13 +36,22 @@ def check_like(state: Mapping[str, NDArray[Any]], own: Mapping[str, NDArray[Any]
             )
 
 
+def _fields(state: Mapping[str, NDArray[Any]]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """The arrays, those of records field by field."""
+    for name, given in state.items():
+        if given.dtype.names is None:
+            yield name, given
+        else:
+            yield from ((f"{name}.{field}", given[field]) for field in given.dtype.names)
+
+
 def check_values(state: Mapping[str, NDArray[Any]], limits: Limits) -> None:
     """Refuse numbers that are not finite, and indices that point at nothing.
 
     Raises:
         ValueError: An array holds such a value; names both.
     """
-    for name, given in state.items():
+    for name, given in _fields(state):
         wrong = np.zeros(np.shape(given), dtype=np.bool_)
         if np.issubdtype(given.dtype, np.floating):
             wrong = ~np.isfinite(given)

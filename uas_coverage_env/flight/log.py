@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import interpreted
+from uas_coverage_env.entities.outcome import FAULT, NONE
 from uas_coverage_env.env.meter import RewardMeter
+from uas_coverage_env.features.event import OfUas
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.flight.record import (
     COVERING,
@@ -26,7 +28,6 @@ from uas_coverage_env.flight.record import (
     last_samples,
 )
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.scenario.events import OfUas
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import (
     DOD,
@@ -39,7 +40,6 @@ from uas_coverage_env.vehicle import (
 )
 from uas_coverage_env.world import CONTACT_NAMES, FLYING, SWAPPING, Command, command_mode
 from uas_coverage_env.world import LOST as IS_LOST
-from uas_coverage_env.world.outcome import FAULT, NONE
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class FlightLog:
         state, names = self._world.state, self._world.names
         found = []
         for e, event in enumerate(self._scenario.events):
-            sample, uas = int(state.event_step[e]), int(state.event_uas[e])
+            sample, uas = int(state.events[e].step), int(state.events[e].uas)
             if sample <= len(self._steps):
                 name = names[uas] if isinstance(event, OfUas) else None
                 found.append(EventRecord(sample * self._scenario.dt_s, event.kind, name, e))
@@ -194,7 +194,7 @@ class FlightLog:
 
     def _sample(self) -> _Sample:
         state = self._world.state
-        return _Sample(state.x.copy(), state.status.copy(), self._covered)
+        return _Sample(state.x.copy(), state.uas["status"].copy(), self._covered)
 
     def _flies(self) -> NDArray[np.bool_]:
         """(T, U) whether a UAS flies from a sample on."""

@@ -9,11 +9,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.codes import ContactKind
 from uas_coverage_env.flight.of_log import OfLog
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, LIMITS, PHI, WX, body_attitude
 from uas_coverage_env.world import CONTACT_NAMES
-from uas_coverage_env.world.codes import ContactKind
 
 MODES = ("covering", "transit", "return", "landed", "lost")
 COVERING, TRANSIT, RETURN, LANDED, LOST = range(len(MODES))

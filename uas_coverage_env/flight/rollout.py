@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.progress import compiling_for
-from uas_coverage_env.disturbances import Disturbance
 from uas_coverage_env.env.meter import RewardMeter
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
+from uas_coverage_env.features import Feature
+from uas_coverage_env.features.of_scenario import features_of
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
@@ -68,7 +69,7 @@ def rollout(
     return_mode: bool | None = None,
     safety_filter: bool | None = None,
     max_steps: int | None = None,
-    disturbances: Sequence[Disturbance] | None = None,
+    disturbances: Sequence[Feature] | None = None,
     reward: Sequence[RewardTerm] = REWARD,
     reward_weights: Mapping[str, float] | None = None,
     on_step: Callable[[Progress], object] | None = None,
@@ -152,7 +153,7 @@ def rollout(
             dynamics=dynamics,
             return_mode=bool(return_mode),
             safety_filter=bool(safety_filter),
-            disturbances=tuple(disturbance.name for disturbance in world.disturbances),
+            disturbances=tuple(each.name for each in world.features if each.disturbs),
             ended=ended,
             wall_time_s=time.perf_counter() - started,
             versions=recorded_versions(),
@@ -186,12 +187,11 @@ def _with_reasons(flight: Flight, planner: Planner) -> Flight:
     return dataclasses.replace(flight, left_open=left_open(flight, said))
 
 
-def _is_uncertain(scenario: Scenario, disturbances: Sequence[Disturbance] | None) -> bool:
+def _is_uncertain(scenario: Scenario, disturbances: Sequence[Feature] | None) -> bool:
     """Whether anything may push back."""
     if disturbances is not None:
-        return bool(disturbances) or bool(scenario.events) or scenario.sensing is not None
-    said = (scenario.wind, scenario.uncertainty, scenario.sensing)
-    return any(table is not None for table in said) or bool(scenario.events)
+        return bool(features_of(scenario, disturbances))
+    return bool(scenario.feature_tables or scenario.events)
 
 
 def _make_ready(
@@ -289,7 +289,7 @@ def _stepped(world: World, packed: NDArray[np.void]) -> NDArray[np.void]:
     except InputError:
         raise
     except ValueError as error:  # the commands are checked: it is what a kernel does
-        names = ", ".join(disturbance.name for disturbance in world.disturbances)
+        names = ", ".join(each.name for each in world.features if each.disturbs)
         raise InputError(f"disturbances of the mission ({names}): {error}") from error
 
 

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.belief import MOST_WIND, wind_growth
+from uas_coverage_env.entities.state import N_BELIEF, WIND
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY, WX, WY, X, Y, Z
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.layout import RATE, SPEED
 from uas_coverage_env.vehicle.tube import belief_gain
 from uas_coverage_env.world import FLYING, Arena, SwarmState
-from uas_coverage_env.world.state import N_BELIEF, WIND
 
 FloatArray = NDArray[np.float64]
 

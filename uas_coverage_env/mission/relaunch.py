@@ -79,5 +79,6 @@ class Relaunch:
 
     def _is_clear(self, u: int, swarm: SwarmState, going: BoolArray) -> bool:
         """Whether a UAS that flies where it stands keeps all safe distances."""
-        arena, status = self._view.arena, np.where(going, FLYING, swarm.status)
-        return bool(interpreted(is_clear)(arena, arena.moving_path_m[0], swarm.x, status, u, 0.0))
+        arena, uas = self._view.arena, self._view.state.uas.copy()
+        uas["status"] = np.where(going, FLYING, swarm.status)
+        return bool(interpreted(is_clear)(arena, arena.moving_path_m[0], swarm.x, uas, u, 0.0))

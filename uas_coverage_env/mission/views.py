@@ -35,10 +35,10 @@ class WorldView:
         """Write what is seen now into arena and state."""
         state = self.state
         state.x[:] = swarm.x
-        state.reference[:] = swarm.reference_mps
-        state.status[:] = swarm.status
-        state.departed[:] = swarm.departed
-        state.returning[:] = swarm.returning
+        state.uas["reference_mps"][:] = swarm.reference_mps
+        state.uas["status"][:] = swarm.status
+        state.uas["departed"][:] = swarm.departed
+        state.uas["returning"][:] = swarm.returning
         state.uncovered[:] = swarm.uncovered
         state.step[0] = swarm.step
         self.arena.moving_path_m[0] = swarm.moving_position_m

@@ -1,9 +1,11 @@
 """What a mission is: scenarios from files, from code and from a seed, checked at the door."""
 
-from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
+from uas_coverage_env.features.parameter_errors import Uncertainty
+from uas_coverage_env.features.sensing import Sensing
+from uas_coverage_env.features.table import DisturbanceTable
+from uas_coverage_env.features.wind import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.checks import free_places_m, out_of_reach, warnings
 from uas_coverage_env.scenario.conditions import Conditions, conditions_of
-from uas_coverage_env.scenario.disturbance_tables import DisturbanceTable
 from uas_coverage_env.scenario.execution import Execution
 from uas_coverage_env.scenario.families import Family, Size, installed_families
 from uas_coverage_env.scenario.family import (
@@ -31,7 +33,6 @@ from uas_coverage_env.scenario.levels import LEVELS, Level, with_disturbances
 from uas_coverage_env.scenario.load import load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
 from uas_coverage_env.scenario.packs import Sorties
-from uas_coverage_env.scenario.sensing import Sensing
 from uas_coverage_env.scenario.source import (
     MissionSource,
     Room,
@@ -39,7 +40,6 @@ from uas_coverage_env.scenario.source import (
     ScenarioLike,
     loaded_scenario,
 )
-from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 __all__ = [
     "ALIASES",

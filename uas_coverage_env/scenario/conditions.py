@@ -11,9 +11,9 @@ from typing import Annotated
 
 from pydantic import Field
 
+from uas_coverage_env.features.parameter_errors import Uncertainty
+from uas_coverage_env.features.wind import Wind
 from uas_coverage_env.files.strict_toml import StrictModel
-from uas_coverage_env.scenario.air import Wind
-from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 STATED_MPS = (4.0, 7.0, 10.0)
 """Mean winds up to which missions are flown, as the levels have them; beyond, each 5 m/s."""

@@ -5,30 +5,15 @@ from typing import Annotated, Any
 
 from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
-from uas_coverage_env.files.strict_toml import StrictModel, parse
+from uas_coverage_env.features.table import FeatureTable
+from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.plugins.installed import entry_points
 from uas_coverage_env.plugins.users_code import described
 
 GROUP = "uas_coverage.disturbances"
 
 
-class DisturbanceTable(StrictModel):
-    """The fields of a disturbance in scenario files; to be derived from.
-
-    A package announces its table in the entry-point group `uas_coverage.disturbances`, under the
-    name that scenario files use.
-    """
-
-    def disturbance(self) -> Any:
-        """The disturbance that the table describes, a `uas_coverage_env.disturbances.Disturbance`.
-
-        Raises:
-            NotImplementedError: The derived class does not say.
-        """
-        raise NotImplementedError(f"{type(self).__name__} has no method disturbance()")
-
-
-def _read(value: Any) -> tuple[tuple[str, DisturbanceTable], ...]:
+def _read(value: Any) -> tuple[tuple[str, FeatureTable], ...]:
     try:
         given = dict(value)
     except (TypeError, ValueError):
@@ -36,8 +21,8 @@ def _read(value: Any) -> tuple[tuple[str, DisturbanceTable], ...]:
     return tuple((name, _table(str(name), given[name])) for name in sorted(given, key=str))
 
 
-def _table(name: str, value: Any) -> DisturbanceTable:
-    if isinstance(value, DisturbanceTable):
+def _table(name: str, value: Any) -> FeatureTable:
+    if isinstance(value, FeatureTable):
         return value
     installed = {entry.name: entry for entry in entry_points(group=GROUP)}
     if name not in installed:
@@ -49,17 +34,17 @@ def _table(name: str, value: Any) -> DisturbanceTable:
         model = installed[name].load()
     except Exception as error:  # whatever a user's module raises is one line
         raise ValueError(f"disturbance {name!r} cannot be loaded: {described(error)}") from error
-    if not isinstance(model, type) or not issubclass(model, DisturbanceTable):
+    if not isinstance(model, type) or not issubclass(model, FeatureTable):
         raise ValueError(f"disturbance {name!r} is installed as {model!r}, no DisturbanceTable")
     return parse(value, model, name)
 
 
-def _plain(tables: tuple[tuple[str, DisturbanceTable], ...]) -> dict[str, Any]:
+def _plain(tables: tuple[tuple[str, FeatureTable], ...]) -> dict[str, Any]:
     return {name: table.model_dump(mode="json", by_alias=True) for name, table in tables}
 
 
 DisturbanceTables = Annotated[
-    tuple[tuple[str, DisturbanceTable], ...],
+    tuple[tuple[str, FeatureTable], ...],
     PlainValidator(_read),
     PlainSerializer(_plain),
     WithJsonSchema({"type": "object", "additionalProperties": {"type": "object"}}),

@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
@@ -22,23 +21,11 @@ from pydantic import (
     model_validator,
 )
 
+from uas_coverage_env.files.names import Name
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.vehicle import vehicle_names
-
-_NAME_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
-_LONGEST_NAME = 64
-
-
-def _checked_name(name: str) -> str:
-    # names are columns of CSV files, keys of dictionaries and parts of file names
-    if not 0 < len(name) <= _LONGEST_NAME or not _NAME_LETTERS.issuperset(name):
-        raise ValueError(
-            f"{name[:80]!r} is no valid name; use 1 to {_LONGEST_NAME} letters A to Z or a to z, "
-            "digits, _ or -"
-        )
-    return name
 
 
 def _as_tuple(value: Any) -> Any:
@@ -48,7 +35,6 @@ def _as_tuple(value: Any) -> Any:
     return tuple(_as_tuple(item) for item in value) if isinstance(value, list | tuple) else value
 
 
-Name = Annotated[str, AfterValidator(_checked_name)]
 Label = Annotated[str, Field(min_length=1, max_length=100)]
 Coordinate_m = Annotated[float, Field(ge=-100_000.0, le=100_000.0)]
 Distance_m = Annotated[float, Field(ge=0.0, le=10_000.0)]

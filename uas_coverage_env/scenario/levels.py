@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from uas_coverage_env.scenario.air import RandomGusts, Wind
+from uas_coverage_env.features.parameter_errors import Uncertainty
+from uas_coverage_env.features.wind import RandomGusts, Wind
 from uas_coverage_env.scenario.model import Scenario
-from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 REFERENCE_HEIGHT_M = 20.0
 """Where the mean wind of a level is reached: about where UAS fly."""

@@ -7,8 +7,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from uas_coverage_env.features.parameter_errors import Uncertainty
+from uas_coverage_env.features.sensing import Sensing
+from uas_coverage_env.features.wind import Gust, RandomGusts, Wind
 from uas_coverage_env.files.strict_toml import StrictModel
-from uas_coverage_env.scenario.air import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.execution import Execution
 from uas_coverage_env.scenario.fields import (
@@ -24,8 +26,6 @@ from uas_coverage_env.scenario.fields import (
 )
 from uas_coverage_env.scenario.model import Scenario
 from uas_coverage_env.scenario.packs import Sorties
-from uas_coverage_env.scenario.sensing import Sensing
-from uas_coverage_env.scenario.uncertainty import Uncertainty
 
 _TABLES = (
     *(Geofence, Uas, Sensor, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),

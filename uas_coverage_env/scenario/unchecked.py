@@ -8,12 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, Strict, model_serializer
 
+from uas_coverage_env.features.event import EventTable
+from uas_coverage_env.features.parameter_errors import Uncertainty
+from uas_coverage_env.features.sensing import Sensing
+from uas_coverage_env.features.table import FeatureTable, shipped
+from uas_coverage_env.features.wind import Wind
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.scenario.air import Wind
 from uas_coverage_env.scenario.conditions import Conditions, conditions_of
 from uas_coverage_env.scenario.disturbance_tables import DisturbanceTables
-from uas_coverage_env.scenario.events import Events, EventTable
+from uas_coverage_env.scenario.events import Events
 from uas_coverage_env.scenario.execution import Execution
 from uas_coverage_env.scenario.fields import (
     Decoration,
@@ -29,12 +33,14 @@ from uas_coverage_env.scenario.fields import (
 )
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.payload import who_covers
-from uas_coverage_env.scenario.sensing import Sensing
-from uas_coverage_env.scenario.uncertainty import Uncertainty
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
 
 GLIDE = 2.0
 """Way over height of the flattest descent from the least height to a start, and of the climb."""
+
+
+_ALWAYS = ("obstacles", "moving_obstacles", "decorations")
+"""In files where they are empty, too."""
 
 
 class UncheckedScenario(StrictModel):
@@ -64,19 +70,28 @@ class UncheckedScenario(StrictModel):
     events: Events = ()
     sorties: Sorties | None = None
     execution: Execution | None = None
+    # the tables of features that nothing here asks for
+    for _table in shipped(FeatureTable):
+        if _table.table not in __annotations__:
+            __annotations__[_table.table] = _table | None
+            locals()[_table.table] = None
+    del _table
 
     @model_serializer(mode="wrap")
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # files, and what is computed from their content, are those of scenarios before the field
         data = serialise(self)
-        optional = (
-            *("place", "min_height_m", "from_ground", "wind", "uncertainty", "disturbances"),
-            *("sensing", "events", "sorties", "relaunch", "execution"),
-        )
-        for name in optional:
-            if not getattr(self, name):
+        for name, field in type(self).model_fields.items():
+            if name not in _ALWAYS and not field.is_required() and not getattr(self, name):
                 data.pop(name, None)
         return data
+
+    @property
+    def feature_tables(self) -> tuple[FeatureTable, ...]:
+        """The tables of features that the scenario has."""
+        own = (getattr(self, name) for name in type(self).model_fields)
+        others = (table for _, table in self.disturbances)
+        return tuple(each for each in (*own, *others) if isinstance(each, FeatureTable))
 
     @cached_property
     def fence(self) -> ConvexPolytope:

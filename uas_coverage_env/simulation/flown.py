@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
+from uas_coverage_env.entities.outcome import FAULT, NONE, OUTCOME_DTYPE
+from uas_coverage_env.entities.state import FLYING, LOST
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.step import MISSION, begin_step
 from uas_coverage_env.simulation.world import World
 from uas_coverage_env.vehicle import N_STATES
-from uas_coverage_env.world.commands import COMMAND_DTYPE
 from uas_coverage_env.world.contacts import (
     check_fence_and_battery,
     check_obstacles,
@@ -18,9 +20,6 @@ from uas_coverage_env.world.contacts import (
     count_breaches,
 )
 from uas_coverage_env.world.coverage import cover, land
-from uas_coverage_env.world.events import happen
-from uas_coverage_env.world.outcome import FAULT, NONE, OUTCOME_DTYPE
-from uas_coverage_env.world.state import FLYING, LOST
 
 _views = MISSION.views
 _UNSEEN = LOST + 100
@@ -30,16 +29,16 @@ _UNSEEN = LOST + 100
 @kernel
 def _hide(state, shown):
     """Take those that are not shown out of what is judged."""
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING and not shown[i]:
-            state.status[i] = _UNSEEN
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING and not shown[i]:
+            state.uas[i].status = _UNSEEN
 
 
 @kernel
 def _show(state):
-    for i in range(state.status.shape[0]):
-        if state.status[i] == _UNSEEN:
-            state.status[i] = FLYING
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == _UNSEEN:
+            state.uas[i].status = FLYING
 
 
 @kernel
@@ -58,19 +57,17 @@ def judge_moment(at, commands, x, resting, known, measured, last, outcome):
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
     arena, state = _views(at)
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING and known[i] == 1:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING and known[i] == 1:
             for k in range(N_STATES):
                 state.x[i, k] = x[i, k]
     begin_step(state, commands, outcome)
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
             for k in range(N_STATES):
                 state.x[i, k] = x[i, k]
             outcome[i].returning = resting[i]
-            state.departed[i] = False  # a log says when a UAS has landed
-    if last and arena.rules[0].eventful:
-        happen(arena, state, outcome)
+            state.uas[i].departed = False  # a log says when a UAS has landed
     _hide(state, known)
     check_obstacles(arena, state, outcome)
     check_separation(arena, state, outcome)
@@ -81,9 +78,9 @@ def judge_moment(at, commands, x, resting, known, measured, last, outcome):
     cover(arena, state, state.step[0] + 1, outcome)
     _show(state)
     land(arena, state, outcome)
-    for i in range(state.status.shape[0]):
-        if state.status[i] == FLYING and outcome[i].contact != NONE:
-            state.status[i] = LOST
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING and outcome[i].contact != NONE:
+            state.uas[i].status = LOST
     if last:
         state.step[0] += 1
 
@@ -147,8 +144,8 @@ class FlownWorld(World):
             )  # fmt: skip
             passes += [(m, int(i)) for i in np.flatnonzero(outcome["newly_covered"])]
             whole = outcome if m == 0 else _both(whole, outcome)
-        out = gone & (self.state.status == FLYING)
-        self.state.status[out], whole["contact"][out] = LOST, FAULT
+        out = gone & (self.state.uas["status"] == FLYING)
+        self.state.uas["status"][out], whole["contact"][out] = LOST, FAULT
         self.change_scene()
         return whole, passes
 

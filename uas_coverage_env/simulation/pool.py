@@ -8,14 +8,15 @@ import numpy as np
 
 from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.views import lane_view, pool_view
-from uas_coverage_env.disturbances import Disturbance, disturbances_of
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import FLYING, STATE, WorldState
+from uas_coverage_env.features.feature import Feature
+from uas_coverage_env.features.of_scenario import disturbances_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.step import begin_mission
 from uas_coverage_env.simulation.world import initial_state
 from uas_coverage_env.world.arena import ARENA, build_arena
 from uas_coverage_env.world.events import is_eventful
-from uas_coverage_env.world.outcome import OUTCOME_DTYPE
-from uas_coverage_env.world.state import FLYING, STATE, WorldState
 
 
 class WorldPool(NamedTuple):
@@ -31,7 +32,7 @@ def pool_worlds(
     scenarios: Sequence[Scenario],
     *,
     measured_m: float = math.inf,
-    slots: Sequence[Sequence[Disturbance | None]] | None = None,
+    slots: Sequence[Sequence[Feature | None]] | None = None,
     judges_wrenches: bool = False,
 ) -> WorldPool:
     """Arenas and starts of scenarios with any numbers of UAS, waypoints and obstacles.
@@ -39,7 +40,7 @@ def pool_worlds(
     Args:
         scenarios: At least one.
         measured_m: See `build_arena`.
-        slots: The disturbances of each, see `in_slots`; None: for callers that fly in still air.
+        slots: The features of each, see `in_slots`; None: for callers that fly in still air.
         judges_wrenches: See `build_arena`.
 
     Raises:
@@ -60,14 +61,14 @@ def pool_worlds(
                 f"scenario {changing[0]} has events, [sensing] or again_after_s; here is none of it"
             )
         slots = [()] * len(scenarios)
-    for scenario, disturbances in zip(scenarios, slots, strict=True):
+    for scenario, features in zip(scenarios, slots, strict=True):
         arena = build_arena(
             scenario,
             measured_m=measured_m,
-            disturbances=disturbances,
+            features=features,
             judges_wrenches=judges_wrenches,
         )
-        start = initial_state(scenario, len(disturbances))
+        start = initial_state(scenario, features)
         begin_mission(arena, start, np.zeros(len(scenario.uas), dtype=OUTCOME_DTYPE))
         arenas.append(arena)
         starts.append(start)
@@ -95,5 +96,5 @@ def lanes_of(n_lanes: int, starts: Pool) -> WorldState:
         starts: `WorldPool.starts`.
     """
     states = STATE.zeros(STATE.largest(starts), lanes=n_lanes)
-    states.status[:] = FLYING
+    states.uas["status"][:] = FLYING
     return states

@@ -6,9 +6,9 @@ waypoint that is asked for again.
 
 import numpy as np
 
+from uas_coverage_env.entities.state import FLYING, WorldState
 from uas_coverage_env.scenario import NoFlyZone, Scenario
 from uas_coverage_env.world.arena import Arena
-from uas_coverage_env.world.state import FLYING, PACK_COVERED, WorldState
 
 
 def changes_scene(scenario: Scenario) -> bool:
@@ -24,7 +24,7 @@ def changes_due(known: Scenario, state: WorldState) -> list[int]:
         state: The state, in arrays of its size.
     """
     step = state.step[0]
-    events = np.flatnonzero(state.event_step == step).tolist()
+    events = np.flatnonzero(state.events["step"] == step).tolist()
     again = np.flatnonzero((state.due_step == step) & (state.due_step > 0))
     return [
         *(e for e in events if known.events[e].changes_scene),
@@ -42,8 +42,8 @@ def scene_after(known: Scenario, change: int, state: WorldState) -> Scenario:
     """
     if change >= len(known.events):
         return known.asked_again(change - len(known.events))
-    time_s = int(state.event_step[change]) * known.dt_s
-    return known.after(known.events[change], time_s, int(state.event_uas[change]))
+    time_s = int(state.events[change].step) * known.dt_s
+    return known.after(known.events[change], time_s, int(state.events[change].uas))
 
 
 def carried_over(known: Scenario, arena: Arena, state: WorldState) -> WorldState:
@@ -65,10 +65,10 @@ def carried_over(known: Scenario, arena: Arena, state: WorldState) -> WorldState
             uncovered &= hull.signed_distance(positions_m) >= 0.0
     if len(uncovered) > len(state.uncovered):
         # one that was called home because nothing was left may have something to do now
-        state.returning[:] = False
-        if not (state.status == FLYING).any():
+        state.uas["returning"][:] = False
+        if not (state.uas["status"] == FLYING).any():
             # likewise one whose last sortie has covered nothing
-            state.packs[:, PACK_COVERED] = 1
+            state.packs["covered"] = True
     due_step = np.zeros(len(arena.again_steps), dtype=np.int64)
     due_step[: len(state.due_step)] = state.due_step
     return state._replace(uncovered=uncovered, due_step=due_step)

@@ -10,45 +10,54 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
-from uas_coverage_env.disturbances import Disturbance
-from uas_coverage_env.disturbances.act import begin_random, disturbance_code
-from uas_coverage_env.disturbances.of_scenario import disturbances_in
-from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.scenario.ground_phases import take_off
-from uas_coverage_env.simulation.scenes import (
-    carried_over,
-    changes_due,
-    changes_scene,
-    scene_after,
-)
-from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
-from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
-from uas_coverage_env.world.arena import Arena, build_arena
-from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
-from uas_coverage_env.world.events import begin_events, is_eventful
-from uas_coverage_env.world.outcome import OUTCOME_DTYPE
-from uas_coverage_env.world.packs import packs_left, swap_steps_left, swaps_alone
-from uas_coverage_env.world.state import (
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import (
     FLYING,
     LANDED,
     STATE,
     SWAPPING,
     SwarmState,
     WorldState,
-    responding,
 )
+from uas_coverage_env.features.feature import Feature, memory_words
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.ground_phases import take_off
+from uas_coverage_env.simulation.flight import feature_code
+from uas_coverage_env.simulation.scenes import (
+    carried_over,
+    changes_due,
+    changes_scene,
+    scene_after,
+)
+from uas_coverage_env.simulation.step import (
+    ACCEPTED,
+    MISSION,
+    begin_features_at,
+    begin_mission,
+    step_world,
+)
+from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
+from uas_coverage_env.world.arena import Arena, build_arena
+from uas_coverage_env.world.packs import (
+    mission_features,
+    packs_left,
+    swap_steps_left,
+    swaps_alone,
+)
+from uas_coverage_env.world.sensing import senses
 
 Dynamics = Literal["lpv", "nonlinear"]
 
 _OUTCOMES_IN_BLOCK = 256
 
 
-def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
+def initial_state(scenario: Scenario, features: Sequence[Feature | None] = ()) -> WorldState:
     """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off."""
     n_uas = len(scenario.uas)
-    sizes = {"U": n_uas, "W": len(scenario.waypoints), "D": n_disturbances}
-    sizes |= {"E": len(scenario.events), "S": n_uas if is_eventful(scenario) else 0}
-    sizes |= {"B": n_uas if swaps_alone(scenario) else 0}
+    sizes = {"U": n_uas, "W": len(scenario.waypoints), "E": len(scenario.events)}
+    sizes |= {"S": n_uas if senses(scenario) else 0, "B": n_uas if swaps_alone(scenario) else 0}
+    sizes["memory words"] = memory_words(features, n_uas)
     sizes["repeats"] = len(scenario.waypoints) if scenario.asks_again else 0
     state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
@@ -57,11 +66,11 @@ def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
         for i, x in enumerate(state.x):
             flown = take_off(scenario, i)
             x[DOD], x[U_TH] = flown.dod, flown.u_th_V
-    state.status[:] = FLYING
+    state.uas["status"][:] = FLYING
     state.uncovered[:] = True
-    if len(state.sensed):
+    if len(state.measured):
         # where and how they start is known
-        state.felt[:] = state.sensed[:] = state.told[:] = state.delayed[:, 0] = state.x
+        state.estimated[:] = state.measured[:] = state.observed[:] = state.x
     return state
 
 
@@ -75,7 +84,7 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
     """
     step = int(state.step[0])
     sample = min(step, len(arena.moving_path_m) - 1)
-    x = state.as_told().x.copy()
+    x = state.as_observed().x.copy()
     turning, turned_rad = arena.vehicles["follows_course"], np.zeros(0)
     if turning.any():
         turned_rad = np.where(turning, x[:, PSI], 0.0)
@@ -85,22 +94,22 @@ def swarm_state(scenario: Scenario, arena: Arena, state: WorldState) -> SwarmSta
         step=step,
         names=tuple(uas.name for uas in scenario.uas),
         x=x,
-        reference_mps=state.reference.copy(),
-        status=np.where(state.status == SWAPPING, LANDED, state.status),
-        departed=state.departed.copy(),
-        returning=state.returning.copy(),
+        reference_mps=state.uas["reference_mps"].copy(),
+        status=np.where(state.uas["status"] == SWAPPING, LANDED, state.uas["status"]),
+        departed=state.uas["departed"].copy(),
+        returning=state.uas["returning"].copy(),
         uncovered=state.uncovered.copy(),
         home_m=arena.uas["home_m"].copy(),
         moving_position_m=arena.moving_path_m[sample].copy(),
         moving_velocity_mps=arena.moving_velocity_mps[sample].copy(),
-        responds=responding(arena, state),
+        responds=state.uas["responds_from_step"] <= step,
         turned_rad=turned_rad,
         packs_left=packs_left(arena, state),
         ground_s=scenario.dt_s * swap_steps_left(arena, state).astype(float),
         again_s=np.where(
             state.due_step > step, scenario.dt_s * (state.due_step - step).astype(float), np.inf
         ),
-        filtered=state.filtered.copy(),
+        filtered=state.uas["filtered"].copy(),
     )
 
 
@@ -119,7 +128,7 @@ class World:
 
     Attributes:
         scenario: As given; likewise dynamics, return_mode and safety_filter.
-        disturbances: What pushes back.
+        features: What the mission has of what few missions have.
         names: Names of the UAS, in order.
         known: The scenario as it is now: events may have changed the scene.
         arena: The same as arrays; not to be changed.
@@ -134,7 +143,7 @@ class World:
         return_mode: bool = False,
         safety_filter: bool = False,
         measured_m: float = math.inf,
-        disturbances: Sequence[Disturbance] | None = None,
+        disturbances: Sequence[Feature] | None = None,
         judges_wrenches: bool = False,
         seed: int = 0,
     ) -> None:
@@ -146,11 +155,11 @@ class World:
         self.return_mode = bool(return_mode)
         self.safety_filter = bool(safety_filter)
         self.names = tuple(uas.name for uas in scenario.uas)
-        self.disturbances = disturbances_in(scenario, disturbances)
+        self.features = mission_features(scenario, disturbances)
         self._measured_m, self._judges_wrenches = measured_m, bool(judges_wrenches)
         self.known, self.revisions = scenario, 0
         self.arena = self._first_arena = self._arena_of(scenario)
-        self._start = initial_state(scenario, len(self.disturbances))
+        self._start = initial_state(scenario, self.features)
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
         self._changes = changes_scene(scenario)
@@ -201,13 +210,15 @@ class World:
             self._prepare()
         for array, start in zip(self.state, self._start, strict=True):
             array[:] = start
-        if self.arena.rules["eventful"][0]:
-            begin_events(self.arena, self.state, np.uint64(self._seed), mission)
-        if self.disturbances:
-            begin_random(
-                self.arena.disturbances, self.state.disturbance_random, np.uint64(self._seed),
-                mission,
-            )  # fmt: skip
+        if self.features or len(self.state.events):
+            begin_features_at(self._addresses(), np.uint64(self._seed), mission)
+
+    def _addresses(self) -> NDArray[np.int64]:
+        """Of arena, state and what features do; they hold until the scene changes."""
+        if not len(self._at):
+            code = feature_code(self.features, nonlinear=self._nonlinear)
+            self._at = np.array([*MISSION.addresses_of(self.arena, self._state), *code])
+        return self._at
 
     def step(self, commands: NDArray[np.void] | Mapping[str, Command]) -> NDArray[np.void]:
         """Fly all UAS for one step.
@@ -234,10 +245,8 @@ class World:
         if self._step is None:
             # not before: environments have a world, too, and a step of their own
             self._assistants = assistants(self.return_mode, self.safety_filter)
-            code = disturbance_code(self.disturbances)
-            self._at = np.array([*MISSION.addresses_of(self.arena, self._state), *code])
         outcome = self._fresh_outcome()
-        arguments = (self._at, commands, self._nonlinear, self._assistants, outcome)
+        arguments = (self._addresses(), commands, self._nonlinear, self._assistants, outcome)
         if self._step is None:
             self._step = machine_code(step_world, arguments)
         invalid = self._step(*arguments)
@@ -250,7 +259,7 @@ class World:
         return build_arena(
             scenario,
             measured_m=self._measured_m,
-            disturbances=self.disturbances,
+            features=self.features,
             judges_wrenches=self._judges_wrenches,
         )
 
@@ -289,11 +298,11 @@ class World:
             ValueError: One of them has not landed; nothing has changed.
         """
         state = self._state
-        if (state.status[uas] != LANDED).any():
+        if (state.uas["status"][uas] != LANDED).any():
             raise ValueError("a UAS that has not landed cannot take off; see swarm_state().status")
-        state.status[uas] = FLYING
-        state.departed[uas] = False
-        state.returning[uas] = False
+        state.uas["status"][uas] = FLYING
+        state.uas["departed"][uas] = False
+        state.uas["returning"][uas] = False
 
     def _fresh_outcome(self) -> NDArray[np.void]:
         """A row of its own for each step, from blocks: to ask for it alone takes longer to make."""
@@ -315,13 +324,13 @@ class World:
     @property
     def active(self) -> tuple[str, ...]:
         """Names of the UAS that fly."""
-        status = self.state.status.tolist()
+        status = self.state.uas["status"].tolist()
         return tuple(name for name, s in zip(self.names, status, strict=True) if s == FLYING)
 
     @property
     def done(self) -> bool:
         """Whether no UAS flies any more, nor swaps packs to fly again."""
-        status = self.state.status
+        status = self.state.uas["status"]
         return FLYING not in status and SWAPPING not in status
 
     @property

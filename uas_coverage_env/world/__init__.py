@@ -1,8 +1,7 @@
 """A mission as it stands: arena, state and commands, contacts and coverage (`docs/rules.md`)."""
 
-from uas_coverage_env.world.arena import Arena, build_arena
-from uas_coverage_env.world.codes import CommandKind, ContactKind, UasStatus
-from uas_coverage_env.world.commands import (
+from uas_coverage_env.entities.codes import CommandKind, ContactKind, UasStatus
+from uas_coverage_env.entities.commands import (
     ACCELERATION,
     CLIMB,
     COMMAND_DTYPE,
@@ -20,9 +19,8 @@ from uas_coverage_env.world.commands import (
     command_mode,
     pack,
 )
-from uas_coverage_env.world.outcome import CONTACT_NAMES, OUTCOME_DTYPE
-from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, NO_WAY, crossing, route
-from uas_coverage_env.world.state import (
+from uas_coverage_env.entities.outcome import CONTACT_NAMES, OUTCOME_DTYPE
+from uas_coverage_env.entities.state import (
     ABSENT,
     CONSUMPTION,
     FLYING,
@@ -36,6 +34,8 @@ from uas_coverage_env.world.state import (
     SwarmState,
     WorldState,
 )
+from uas_coverage_env.world.arena import Arena, build_arena
+from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, NO_WAY, crossing, route
 
 __all__ = [
     "ABSENT",

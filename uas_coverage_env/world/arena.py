@@ -8,25 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory, record_dtype
+from uas_coverage_env.entities.commands import CLIMB, COMMAND_DTYPE
+from uas_coverage_env.features.feature import FEATURE_DTYPE, Feature, feature_tables
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
 from uas_coverage_env.vehicle.stopping import stopping_of
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
-from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.world.corners import route_corners
-from uas_coverage_env.world.disturbance import (
-    DISTURBANCE_DTYPE,
-    Disturbance,
-    disturbance_tables,
-)
-from uas_coverage_env.world.events import (
-    EVENT_DTYPE,
-    SENSING_DTYPE,
-    event_records,
-    is_eventful,
-    sensing_records,
-)
+from uas_coverage_env.world.events import EVENT_DTYPE, event_records, is_eventful
 from uas_coverage_env.world.obstacles import (
     OBSTACLE_DTYPE,
     ROUTE_MARGIN_M,
@@ -35,6 +25,7 @@ from uas_coverage_env.world.obstacles import (
     overfly_limit,
 )
 from uas_coverage_env.world.packs import PACKS_DTYPE, pack_records
+from uas_coverage_env.world.sensing import SENSING_DTYPE, sensing_records
 from uas_coverage_env.world.tubes import route_tube_m, tubes_m
 from uas_coverage_env.world.waypoints import (
     N_WAYPOINT_COLUMNS,
@@ -152,10 +143,10 @@ class Arena(NamedTuple):
     """[m] corners at which routes turn."""
     node_distance_m: Annotated[NDArray[np.float64], "W + U", "N"]
     """[m] way from a corner to a waypoint or a start; inf where there is none."""
-    disturbances: Annotated[NDArray[np.void], DISTURBANCE_DTYPE, "blocks"]
-    """As many as `WorldState` has room for; that is the same in all missions of a pool."""
-    disturbance_parameters: Annotated[NDArray[np.float64], "parameters"]
-    """Of all disturbances."""
+    features: Annotated[NDArray[np.void], FEATURE_DTYPE, "features"]
+    """As many in all missions of a pool."""
+    feature_words: Annotated[NDArray[np.uint64], "feature words"]
+    """Their records."""
     events: Annotated[NDArray[np.void], EVENT_DTYPE, "E"]
     sensing: Annotated[NDArray[np.void], SENSING_DTYPE, "S"]
     """One for each UAS, or none where they are known as they are."""
@@ -172,7 +163,7 @@ def build_arena(
     scenario: Scenario,
     *,
     measured_m: float = math.inf,
-    disturbances: Sequence[Disturbance | None] = (),
+    features: Sequence[Feature | None] = (),
     judges_wrenches: bool = False,
 ) -> Arena:
     """The scenario as arrays.
@@ -185,8 +176,8 @@ def build_arena(
         measured_m: Clearances from obstacles and separations of UAS that are larger are taken as
             infinite [m]. What a contact or a breach depends on is measured in any case: with 0,
             only that, which takes a tenth less time.
-        disturbances: What acts besides the scenario's own rules. What the scenario says of
-            disturbances is left to the caller: planners build arenas, too.
+        features: What the mission has of what few missions have. What the scenario says of it
+            is left to the caller: planners build arenas, too.
         judges_wrenches: Whether a wrench that leaves the vehicle's limits is paid for, and may lose
             the UAS (`docs/rules.md`): for learners.
     """
@@ -197,8 +188,8 @@ def build_arena(
     rules["unit_m"] = unit_m_of(waypoints["position_m"])
     targets_m = np.concatenate([waypoints["position_m"], uas["home_m"]])
     overfly_m = overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
-    blocks, parameters = disturbance_tables(disturbances)
-    rules["disturbed"] = blocks["acts"].any()
+    feature_rows, feature_words = feature_tables(features, len(uas))
+    rules["disturbed"] = any(feature is not None and feature.disturbs for feature in features)
     tube_m = tubes_m(scenario, int(rules["lookahead_steps"][0]), bool(rules["disturbed"][0]))
     route_m = ROUTE_MARGIN_M + route_tube_m(tube_m)
     obstacles, planes = obstacle_records(scenario, radius_m, overfly_m, route_m)
@@ -234,9 +225,9 @@ def build_arena(
         rules=rules,
         nodes_m=corners.nodes_m,
         node_distance_m=corners.distance_m,
-        disturbances=blocks,
-        disturbance_parameters=parameters,
-        events=event_records(scenario),
+        features=feature_rows,
+        feature_words=feature_words,
+        events=event_records(scenario, features),
         sensing=sensing_records(scenario),
         packs=pack_records(scenario),
         tube_m=tube_m,

@@ -3,6 +3,18 @@
 import math
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, stack_array
+from uas_coverage_env.entities.commands import WRENCH
+from uas_coverage_env.entities.outcome import (
+    BATTERY,
+    BREACH_TOLERANCE_M,
+    FENCE,
+    LIMITS,
+    MOVING_OBSTACLE,
+    NONE,
+    OBSTACLE,
+    UAS,
+)
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.geometry import (
     cylinder_clearance,
     cylinder_gap,
@@ -18,20 +30,8 @@ from uas_coverage_env.world.broad_phase import (
     write_lower_bounds,
     write_meetings,
 )
-from uas_coverage_env.world.commands import WRENCH
 from uas_coverage_env.world.height import is_too_low
-from uas_coverage_env.world.outcome import (
-    BATTERY,
-    BREACH_TOLERANCE_M,
-    FENCE,
-    LIMITS,
-    MOVING_OBSTACLE,
-    NONE,
-    OBSTACLE,
-    UAS,
-)
 from uas_coverage_env.world.routes import box_apart
-from uas_coverage_env.world.state import FLYING
 
 
 @kernel
@@ -191,9 +191,9 @@ def check_obstacles(arena, state, outcome):
     now_m = arena.moving_path_m[step]
     next_m = arena.moving_path_m[step + 1]
     rules = arena.rules[0]
-    for i in range(state.status.shape[0]):
+    for i in range(state.uas.shape[0]):
         event = outcome[i]
-        if state.status[i] != FLYING:
+        if state.uas[i].status != FLYING:
             continue
         x0 = event.before_m[0]
         y0 = event.before_m[1]
@@ -236,13 +236,13 @@ def check_obstacles(arena, state, outcome):
 @inlined_kernel
 def check_separation(arena, state, outcome):
     """Separations between flying UAS over the step, and contacts: both are lost."""
-    n_uas = state.status.shape[0]
+    n_uas = state.uas.shape[0]
     measured_m = arena.rules[0].measured_m
     for i in range(n_uas):
-        if state.status[i] != FLYING:
+        if state.uas[i].status != FLYING:
             continue
         for j in range(i + 1, n_uas):
-            if state.status[j] != FLYING:
+            if state.uas[j].status != FLYING:
                 continue
             apart_m = _separation(
                 outcome[i].before_m, outcome[j].before_m, state.x[i], state.x[j], measured_m
@@ -261,8 +261,8 @@ def check_fence_and_battery(arena, state, outcome):
     The fence is convex: a segment that starts inside leaves it only if its end lies outside.
     """
     rules = arena.rules[0]
-    for i in range(state.status.shape[0]):
-        if state.status[i] != FLYING:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status != FLYING:
             continue
         outside_m = signed_distance(
             arena.normals,
@@ -292,8 +292,8 @@ def flew_judged_wrench(arena, event):
 @rare_kernel
 def check_wrenches(arena, state, outcome):
     """Lose the UAS that their wrenches have taken out of control, see `vehicle.LOST_BEYOND`."""
-    for i in range(state.status.shape[0]):
-        judged = state.status[i] == FLYING and flew_judged_wrench(arena, outcome[i])
+    for i in range(state.uas.shape[0]):
+        judged = state.uas[i].status == FLYING and flew_judged_wrench(arena, outcome[i])
         if judged and is_out_of_control(arena.vehicles[i], state.x[i]):
             _record_contact(outcome[i], LIMITS, -1)
 
@@ -331,9 +331,9 @@ def count_breaches(arena, state, outcome):
     rules = arena.rules[0]
     step = min(state.step[0] + 1, arena.moving_path_m.shape[0] - 1)
     next_m = arena.moving_path_m[step]
-    for i in range(state.status.shape[0]):
+    for i in range(state.uas.shape[0]):
         event = outcome[i]
-        if state.status[i] != FLYING or event.contact != NONE:
+        if state.uas[i].status != FLYING or event.contact != NONE:
             continue
         x = state.x[i, X]
         y = state.x[i, Y]
@@ -343,11 +343,11 @@ def count_breaches(arena, state, outcome):
         # at the end of the segment nothing is nearer than it was somewhere on it; the same below
         if event.obstacle_clearance_m < radius_m + rules.safe_distance_max_m + EPS_M:
             count = obstacle_breaches(arena, next_m, i, x, y, z)
-        for j in range(state.status.shape[0]):
+        for j in range(state.uas.shape[0]):
             keep_m = radius_m + arena.uas[j].radius_m + rules.uas_safe_distance_m
             if event.separation_m > keep_m + EPS_M:
                 continue
-            if j != i and state.status[j] == FLYING and outcome[j].contact == NONE:
+            if j != i and state.uas[j].status == FLYING and outcome[j].contact == NONE:
                 other = state.x[j]
                 apart_m = outside_cylinder(0.0, 0.0, x - other[X], y - other[Y], z - other[Z])
                 if apart_m < keep_m - BREACH_TOLERANCE_M:
@@ -363,7 +363,7 @@ def count_breaches(arena, state, outcome):
 @inlined_kernel
 def check_limits(arena, state, nonlinear, outcome):
     """Note which of the vehicle's limits each UAS that flew exceeds; one that has landed rests."""
-    for i in range(state.status.shape[0]):
+    for i in range(state.uas.shape[0]):
         event = outcome[i]
         if event.flew:
             event.limits_exceeded = limits_exceeded(

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
+from uas_coverage_env.entities.outcome import NONE
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world.outcome import NONE
-from uas_coverage_env.world.state import FLYING, LANDED
 from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, REACH_M2, WEIGHT
 
 
@@ -82,9 +82,9 @@ def cover(arena, state, sample, outcome):
         sample: Number of the sample.
         outcome: (U,) of OUTCOME_DTYPE; what was covered is written.
     """
-    for i in range(state.status.shape[0]):
+    for i in range(state.uas.shape[0]):
         event = outcome[i]
-        if state.status[i] != FLYING or event.contact != NONE:
+        if state.uas[i].status != FLYING or event.contact != NONE:
             continue
         x = state.x[i, X]
         y = state.x[i, Y]
@@ -123,16 +123,16 @@ def land(arena, state, outcome):
     A landed UAS rests: no speed, no tilt, no rates; its battery stays as it is.
     """
     rules = arena.rules[0]
-    for i in range(state.status.shape[0]):
-        if state.status[i] != FLYING or outcome[i].contact != NONE:
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status != FLYING or outcome[i].contact != NONE:
             continue
         slow = speed_of(state.x[i]) < rules.landing_speed_mps
         if away_from_home_m(arena.uas[i], state.x[i]) > rules.landing_distance_m:
-            state.departed[i] = True
-        elif slow and (state.departed[i] or outcome[i].returning):
-            state.status[i] = LANDED
+            state.uas[i].departed = True
+        elif slow and (state.uas[i].departed or outcome[i].returning):
+            state.uas[i].status = LANDED
             outcome[i].landed = True
-            state.reference[i, 0] = 0.0
-            state.reference[i, 1] = 0.0
+            state.uas[i].reference_mps[0] = 0.0
+            state.uas[i].reference_mps[1] = 0.0
             for k in range(VX, DOD):
                 state.x[i, k] = 0.0

@@ -1,7 +1,7 @@
 """The least height above ground and roofs, and where it does not hold: near a UAS's start."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.world.outcome import BREACH_TOLERANCE_M
+from uas_coverage_env.entities.outcome import BREACH_TOLERANCE_M
 from uas_coverage_env.world.routes import box_apart
 
 HEIGHT_MARGIN_M = 0.5

@@ -1,29 +1,29 @@
 """Fresh battery packs for UAS that have landed at home, while the others fly on."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
 from uas_coverage_env.compiled.memory import record_dtype
+from uas_coverage_env.entities.state import (
+    FLYING,
+    LANDED,
+    LOST,
+    NEVER,
+    SWAPPING,
+)
+from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.of_scenario import features_of
 from uas_coverage_env.geometry import cylinder_clearance, outside_cylinder
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import landing, take_off
 from uas_coverage_env.vehicle import DOD, U_TH, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.contacts import obstacle_breaches
 from uas_coverage_env.world.coverage import can_cover
-from uas_coverage_env.world.events import N_DELAYED, NEVER, deaf_until, steps_until
-from uas_coverage_env.world.state import (
-    FLYING,
-    LANDED,
-    LOST,
-    PACK_COVERED,
-    PACK_NUMBER,
-    PACK_OUT,
-    PACK_READY,
-    SWAPPING,
-)
+from uas_coverage_env.world.events import steps_until
 
 AHEAD_S = 5.0
 """No UAS takes off where another one, flying on as it does, would come too near within this [s]."""
@@ -78,10 +78,10 @@ def packs_left(arena, state) -> NDArray[np.int64]:
     """
     if not len(arena.packs):
         return np.zeros(0, np.int64)
-    out = np.isin(state.status, (LANDED, LOST)).sum()
-    waits = (state.packs[:, PACK_COVERED] == 0) & (state.packs[:, PACK_OUT] >= out)
-    flies_again = (state.status == FLYING) | ((state.status == SWAPPING) & ~waits)
-    return np.where(flies_again, arena.packs["number"] - 1 - state.packs[:, PACK_NUMBER], 0)
+    out = np.isin(state.uas["status"], (LANDED, LOST)).sum()
+    waits = ~state.packs["covered"] & (state.packs["out"] >= out)
+    flies_again = (state.uas["status"] == FLYING) | ((state.uas["status"] == SWAPPING) & ~waits)
+    return np.where(flies_again, arena.packs["number"] - 1 - state.packs["number"], 0)
 
 
 def swap_steps_left(arena, state) -> NDArray[np.int64]:
@@ -92,27 +92,27 @@ def swap_steps_left(arena, state) -> NDArray[np.int64]:
     """
     if not len(arena.packs):
         return np.zeros(0, np.int64)
-    left = np.maximum(state.packs[:, PACK_READY] - state.step[0], 0)
-    return np.where(state.status == SWAPPING, left, 0)
+    left = np.maximum(state.packs["ready_step"] - state.step[0], 0)
+    return np.where(state.uas["status"] == SWAPPING, left, 0)
 
 
 @rare_kernel
-def is_clear(arena, moving_m, x, status, i, ahead_s):
+def is_clear(arena, moving_m, x, uas, i, ahead_s):
     """Whether UAS i keeps all safe distances where it stands.
 
     Args:
         arena: The arena.
         moving_m: (M, 3) [m] where the moving obstacles are.
         x: (U, 14) states.
-        status: (U,) of them.
+        uas: (U,) records with their `status`.
         i: Which.
         ahead_s: For how long those that fly are taken to fly straight on [s].
     """
     here = x[i]
     if obstacle_breaches(arena, moving_m, i, here[X], here[Y], here[Z]) > 0:
         return False
-    for j in range(status.shape[0]):
-        if j == i or status[j] != FLYING:
+    for j in range(uas.shape[0]):
+        if j == i or uas[j].status != FLYING:
             continue
         kept_m = arena.uas[i].radius_m + arena.uas[j].radius_m + arena.rules[0].uas_safe_distance_m
         dx = here[X] - x[j, X]
@@ -154,7 +154,7 @@ def _to_do(arena, state, i):
             opens = state.due_step[w]
         if not can_cover(arena, i, w):
             continue
-        begins = max(opens, state.packs[i, PACK_READY])
+        begins = max(opens, state.packs[i].ready_step)
         reach_m = 0.5 * uas.speed_mps * rules.dt_s * (rules.max_steps - begins)
         waypoint = arena.waypoints[w]
         north_m = waypoint.position_m[0] - state.x[i, X]
@@ -168,31 +168,26 @@ def _to_do(arena, state, i):
 def _take_off(arena, state, i, out):
     """Let UAS i fly with its next pack, at rest where it has landed."""
     pack = arena.packs[i]
-    state.status[i] = FLYING
-    state.departed[i] = False
-    state.returning[i] = False
+    state.uas[i].status = FLYING
+    state.uas[i].departed = False
+    state.uas[i].returning = False
     state.x[i, DOD] = pack.dod
     state.x[i, U_TH] = pack.u_th_V
-    if state.told.shape[0] > 0:
-        # which pack is in is known at once
-        for k in range(N_DELAYED):
-            state.delayed[i, k, DOD] = pack.dod
-            state.delayed[i, k, U_TH] = pack.u_th_V
     kept = state.packs[i]
-    kept[PACK_NUMBER] += 1
-    kept[PACK_COVERED] = 0
-    kept[PACK_OUT] = out
+    kept.number += 1
+    kept.covered = False
+    kept.out = out
 
 
 @inlined_kernel
 def _end(state, i, outcome):
     """UAS i has landed for good."""
-    state.status[i] = LANDED
+    state.uas[i].status = LANDED
     outcome[i].landed = True
 
 
 @rare_kernel
-def swap_packs(arena, state, outcome):
+def _swap_packs(arena, state, outcome, f):
     """Let UAS that have landed swap packs, and fly again when they have a fresh one.
 
     One that lands with a pack left swaps. It has landed for good where no waypoint is open any
@@ -206,44 +201,66 @@ def swap_packs(arena, state, outcome):
         arena: The arena.
         state: The state at the new sample, judged; written.
         outcome: (U,) of OUTCOME_DTYPE; landed is written: whether it has landed for good.
+        f: Number of the feature.
     """
-    n_uas = state.status.shape[0]
+    n_uas = state.uas.shape[0]
     step = state.step[0]
     over = step >= arena.rules[0].max_steps
     for i in range(n_uas):
         kept = state.packs[i]
         if outcome[i].newly_covered > 0:
-            kept[PACK_COVERED] = 1
-        if outcome[i].landed and kept[PACK_NUMBER] + 1 < arena.packs[i].number:
-            state.status[i] = SWAPPING
+            kept.covered = True
+        if outcome[i].landed and kept.number + 1 < arena.packs[i].number:
+            state.uas[i].status = SWAPPING
             outcome[i].landed = False
-            kept[PACK_READY] = step + arena.packs[i].swap_steps
+            kept.ready_step = step + arena.packs[i].swap_steps
     out = 0
     works = False
     for i in range(n_uas):
-        if state.status[i] == SWAPPING and (
-            over or _to_do(arena, state, i) == NOTHING or deaf_until(arena, state, i, step) == NEVER
+        if state.uas[i].status == SWAPPING and (
+            over or _to_do(arena, state, i) == NOTHING or state.uas[i].responds_from_step >= NEVER
         ):
             _end(state, i, outcome)
-        out += state.status[i] == LANDED or state.status[i] == LOST
-        works |= state.status[i] == FLYING
+        out += state.uas[i].status == LANDED or state.uas[i].status == LOST
+        works |= state.uas[i].status == FLYING
     moving_m = arena.moving_path_m[min(step, arena.moving_path_m.shape[0] - 1)]
     for i in range(n_uas):
         kept = state.packs[i]
-        if state.status[i] != SWAPPING:
+        if state.uas[i].status != SWAPPING:
             continue
-        waits = kept[PACK_COVERED] == 0 and out <= kept[PACK_OUT]
+        waits = not kept.covered and out <= kept.out
         to_do = _to_do(arena, state, i)
         works |= not waits or to_do & LATER > 0
         if (
             to_do & NOW > 0
             and not waits
-            and step >= kept[PACK_READY]
-            and deaf_until(arena, state, i, step) <= step
-            and is_clear(arena, moving_m, state.x, state.status, i, AHEAD_S)
+            and step >= kept.ready_step
+            and state.uas[i].responds_from_step <= step
+            and is_clear(arena, moving_m, state.x, state.uas, i, AHEAD_S)
         ):
             _take_off(arena, state, i, out)
     if not works:
         for i in range(n_uas):
-            if state.status[i] == SWAPPING:
+            if state.uas[i].status == SWAPPING:
                 _end(state, i, outcome)
+
+
+PACKS = Feature("packs", {Point.JUDGED: _swap_packs})
+"""Swaps of each UAS on its own."""
+
+
+def mission_features(
+    scenario: Scenario, disturbances: Sequence[Feature] | None = None
+) -> tuple[Feature, ...]:
+    """What a mission has of what few missions have.
+
+    Args:
+        scenario: Of the mission.
+        disturbances: In place of what the scenario's tables say that acts on how UAS fly; None:
+            these.
+
+    Raises:
+        ValueError: See `features_of`.
+    """
+    packs = [PACKS] if swaps_alone(scenario) else []
+    return (*features_of(scenario, disturbances), *packs)

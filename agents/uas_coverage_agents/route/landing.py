@@ -7,8 +7,8 @@ import numpy as np
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, LEAD_S
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, X, Y, Z, fly_kinematics
-from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 
 _LANDING_SHARE = 0.9

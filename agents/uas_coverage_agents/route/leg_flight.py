@@ -17,6 +17,7 @@ from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, LEAD_S, passes_over
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_hold_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.vehicle import (
     N_INPUTS,
     N_STATES,
@@ -30,7 +31,6 @@ from uas_coverage_env.vehicle import (
     Z,
     fly_kinematics,
 )
-from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import NO_WAY, ROUND_CORNER, crossing, route
 

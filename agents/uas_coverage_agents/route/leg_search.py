@@ -38,9 +38,9 @@ from uas_coverage_env.autopilot.lookahead import (
     moving_slack,
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, X, Y, Z
 from uas_coverage_env.world import COMMAND_DTYPE
-from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import NO_WAY, route
 

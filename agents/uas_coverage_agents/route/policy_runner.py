@@ -146,7 +146,7 @@ class RouteRunner:
         state, plan = self._routes.view.state, self._plans[u]
         belief = None if self._learnt is None else self._learnt.belief[u]
         if not plan_along(
-            self._arena, self._around, u, state.x[u], state.reference[u],
+            self._arena, self._around, u, state.x[u], state.uas[u].reference_mps[:],
             self._routes.of(u)[:AHEAD], self._flight, plan, kept, self._rng, self._workspace,
             belief,
         ):  # fmt: skip

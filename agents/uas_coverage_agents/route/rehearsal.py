@@ -21,9 +21,9 @@ from uas_coverage_agents.route.places import detour_s, write_place
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import fly_kinematically
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.vehicle import N_STATES, VZ, X, Y, Z
 from uas_coverage_env.world import Arena
-from uas_coverage_env.world.commands import VELOCITY
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 
 CANDIDATES = 4

@@ -26,10 +26,10 @@ from uas_coverage_agents.route.leg_flight import (
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import PLENTY_M
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.env.observation import Feature, Group
 from uas_coverage_env.env.observation.surroundings import free_way
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 
 LAYOUT = "route_velocity_v2"

@@ -120,6 +120,7 @@ class RouteVelocityRunner:
         view, targets = self.routes.view, self.routes.of(u)[:AHEAD]
         self.ahead[u, : len(targets)] = targets
         return observe_route(
-            view.arena, u, view.state.x[u], view.state.reference[u], self.ahead[u], len(targets),
+            view.arena, u, view.state.x[u], view.state.uas[u].reference_mps, self.ahead[u],
+            len(targets),
             self.rows[u], self.frames[u],
         )  # fmt: skip

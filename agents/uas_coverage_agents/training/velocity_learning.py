@@ -56,12 +56,12 @@ from uas_coverage_agents.training.scenarios import town, validation_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly, score
 from uas_coverage_env.autopilot import velocity_of
 from uas_coverage_env.autopilot.control import write_command
+from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
 from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.scenario import LEVELS, Scenario, with_disturbances
 from uas_coverage_env.world import COMMAND_DTYPE
-from uas_coverage_env.world.commands import VELOCITY
 
 CURVE_MISSIONS, SCORE_MISSIONS = 6, 40
 _RETREATS = [
@@ -168,7 +168,7 @@ class DaggerRunner(RouteVelocityRunner):
 
     def _expert_velocity(self, u: int) -> list[float]:
         view, n = self.routes.view, min(len(self.routes.of(u)), AHEAD)
-        x, reference = view.state.x[u], view.state.reference[u]
+        x, reference = view.state.x[u], view.state.uas[u].reference_mps[:]
         # with more caution than the expert flies itself, since the learner errs
         for held, spare_m in ((self._settings.held, self._settings.spare_m), (1, 0.0)):
             if steer_along(
@@ -192,7 +192,8 @@ class DaggerRunner(RouteVelocityRunner):
             east_mps = share * speed_mps * math.sin(angle_rad)
             write_command(command, VELOCITY, north_mps, east_mps, altitude_m)
             spare_m = spare_distance(
-                view.arena, u, view.state.x[u], view.state.reference[u], command, 1, -math.inf,
+                view.arena, u, view.state.x[u], view.state.uas[u].reference_mps, command, 1,
+                -math.inf,
                 path_m,
             )  # fmt: skip
             if spare_m > found_m:

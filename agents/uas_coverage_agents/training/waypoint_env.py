@@ -27,11 +27,11 @@ from uas_coverage_agents.waypoint.team import (
     TIME,
 )
 from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.state_dict import Limits, check_like, check_values
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.state import STATE
 
 _LARGEST_SHARE_COVERED = 0.7
 _MOST_DISCHARGED = 0.3

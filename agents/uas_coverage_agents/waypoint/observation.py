@@ -35,7 +35,7 @@ _TURN_MPS2 = 3.0
 @allocating_kernel
 def covers(state, targets, i):
     """Whether a UAS flies and is not on its way home."""
-    return state.status[i] == FLYING and not state.returning[i] and targets[i] != HOME
+    return state.uas[i].status == FLYING and not state.uas[i].returning and targets[i] != HOME
 
 
 @allocating_kernel
@@ -136,7 +136,7 @@ def _team(arena, legs, state, targets, from_s, here_home_s, budgets_s, ready_s, 
     for j in range(targets.shape[0]):
         place[j] = ABSENT
         ready_s[j] = 0.0
-        if state.status[j] != FLYING:
+        if state.uas[j].status != FLYING:
             continue
         x = state.x[j]
         uas = arena.uas[j]
@@ -300,7 +300,7 @@ def observe(arena, legs, state, blocked, targets, i, candidates, legal, row):
     mates_s = 600.0
     mate_m = math.inf
     for j in range(n_uas):
-        if j == i or state.status[j] != FLYING:
+        if j == i or state.uas[j].status != FLYING:
             continue
         if place[j] == ABSENT:
             n_away += 1

@@ -143,7 +143,7 @@ class WaypointRunner:
         silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
         self._targets[silent] = NO_TARGET
         # one that takes no commands is as one on its way home, to the others and in simulations
-        state.returning[:] |= self._returning | silent
+        state.uas["returning"][:] |= self._returning | silent
         choices = self._workspace.choices
         looked_ahead = self._simulations == 0
         while True:
@@ -165,7 +165,7 @@ class WaypointRunner:
             )  # fmt: skip
             choose(self._targets, choices.candidates, i, choice if follow < 0 else follow)
         # the world may call a UAS for a while; one that is called here lands first
-        self._returning[:] |= state.returning & ~silent & ~swarm.returning
+        self._returning[:] |= state.uas["returning"] & ~silent & ~swarm.returning
         self._returning &= swarm.status == FLYING
 
     def _search(self, state: WorldState) -> None:

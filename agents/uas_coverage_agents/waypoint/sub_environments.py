@@ -112,7 +112,7 @@ def begin_lane(
     copy_arrays(start_of(worlds.starts, s), state)
     for w in range(state.uncovered.shape[0]):
         state.uncovered[w] = state.uncovered[w] and not covered[w]
-    for i in range(state.status.shape[0]):
+    for i in range(state.uas.shape[0]):
         state.x[i, DOD] += discharged[i]
     lanes.scenario[lane] = s
     lanes.targets[lane] = NO_TARGET

@@ -19,12 +19,12 @@ from uas_coverage_agents.waypoint.observation import (
 from uas_coverage_env.autopilot import has_to_return
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.mission import find_blocked
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.vehicle import Z
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, GO_TO, HOME, OUTCOME_DTYPE, VELOCITY
 from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.state import STATE
 
 NO_UAS = -1
 
@@ -85,8 +85,8 @@ def next_to_decide(arena, legs, state, return_mode, blocked, targets, choices):
         find_blocked(arena, state.step[0], 0.0, 0.0, 0.0, blocked)
     n_uas = targets.shape[0]
     for i in range(n_uas):
-        if state.status[i] == FLYING and return_mode and not state.returning[i]:
-            state.returning[i] = has_to_return(arena, state, i)
+        if state.uas[i].status == FLYING and return_mode and not state.uas[i].returning:
+            state.uas[i].returning = has_to_return(arena, state, i)
     done = not state.uncovered.any()
     claimed = np.empty(blocked.shape[0], dtype=np.bool_)
     may = np.empty(blocked.shape[0], dtype=np.bool_)
@@ -122,7 +122,7 @@ def write_commands(state, targets, commands):
 @allocating_kernel
 def is_over(arena, state):
     """Whether no UAS is flying, or the time is up."""
-    return state.step[0] >= arena.rules[0].max_steps or not (state.status == FLYING).any()
+    return state.step[0] >= arena.rules[0].max_steps or not (state.uas["status"] == FLYING).any()
 
 
 @allocating_kernel
@@ -159,7 +159,7 @@ def fly_on(
             account[ENERGY] += outcome[j].energy_Wh
             account[FILTERED] += outcome[j].filtered
             account[LOST_UAS] += outcome[j].contact != 0
-    account[NOT_HOME] = (state.status == FLYING).sum()
+    account[NOT_HOME] = (state.uas["status"] == FLYING).sum()
     account[LEFT] = state.uncovered.sum()
     return NO_UAS
 

@@ -17,9 +17,9 @@ from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target_position
 from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_kinematically
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import CLIMB, VELOCITY
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, VZ, X, Y, Z, fly_kinematics
-from uas_coverage_env.world.commands import CLIMB, VELOCITY
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import CLEAR, box_apart, crossing, route
 

@@ -29,10 +29,10 @@ from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.mission import Range, WorldView
 from uas_coverage_env.vehicle import DELTA_THRUST
 from uas_coverage_env.world import FLYING, GO_TO, HOME, WRENCH, SwarmState
-from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 
 FloatArray = NDArray[np.float64]
 
@@ -171,7 +171,7 @@ class Safeguard:
             homeward: Those of `uas` that fly home; the others brake.
         """
         arena, state = self._world.arena, self._world.state
-        outcome = np.zeros(len(state.status), OUTCOME_DTYPE)
+        outcome = np.zeros(len(state.uas), OUTCOME_DTYPE)
         outcome["applied_command"] = arena.rules[0]["brake"]
         for u, inputs in flown.items():
             outcome["applied_command"]["kind"][u] = WRENCH
@@ -192,8 +192,8 @@ def _assisted(codes, arena, state, outcome, wrenches):
     for k in range(len(codes)):
         assist(codes[k], arena, state, False, outcome)
     for i in range(len(outcome)):
-        if state.status[i] == FLYING:
-            reference = state.reference[i].copy()
+        if state.uas[i].status == FLYING:
+            reference = state.uas[i].reference_mps.copy()
             command = outcome[i].applied_command
             command_wrench(arena.vehicles[i], state.x[i], reference, command, wrenches[i])
 

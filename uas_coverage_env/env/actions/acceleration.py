@@ -2,12 +2,12 @@
 
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.entities.commands import ACCELERATION as COMMAND
+from uas_coverage_env.entities.commands import Acceleration
 from uas_coverage_env.env.actions.kind import ActionKind, Range
 from uas_coverage_env.env.actions.landing import refuse_landing_unless_departed
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
-from uas_coverage_env.world.commands import ACCELERATION as COMMAND
-from uas_coverage_env.world.commands import Acceleration
 
 
 def _ranges(vehicle: VehicleParams, scenario: Scenario) -> tuple[Range, ...]:

@@ -1,7 +1,7 @@
 """What no action but home as a waypoint can express: to land where a UAS has not left."""
 
+from uas_coverage_env.entities.commands import command_mode
 from uas_coverage_env.world import Command, WorldState
-from uas_coverage_env.world.commands import command_mode
 
 
 def refuse_landing_unless_departed(state: WorldState, i: int, command: Command) -> None:
@@ -10,7 +10,7 @@ def refuse_landing_unless_departed(state: WorldState, i: int, command: Command) 
     Raises:
         ValueError: It would.
     """
-    if command_mode(command) == "return" and not state.departed[i]:
+    if command_mode(command) == "return" and not state.uas[i].departed:
         raise ValueError(
             "it has not left its start, and only home as a waypoint action lands it there"
         )

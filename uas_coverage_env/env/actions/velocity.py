@@ -4,12 +4,12 @@ import math
 
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.entities.commands import VELOCITY as COMMAND
+from uas_coverage_env.entities.commands import Velocity
 from uas_coverage_env.env.actions.kind import ActionKind, Range
 from uas_coverage_env.env.actions.landing import refuse_landing_unless_departed
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
-from uas_coverage_env.world.commands import VELOCITY as COMMAND
-from uas_coverage_env.world.commands import Velocity
 
 ALTITUDE_MARGIN_M = 1.0
 """Altitudes of the velocity action keep this much more than the fence's margin [m]."""

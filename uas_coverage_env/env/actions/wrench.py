@@ -1,12 +1,12 @@
 """The paper's inputs: lift and torques, held over a step (Gasche et al., Sec. II)."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.entities.commands import WRENCH as COMMAND
+from uas_coverage_env.entities.commands import Wrench
 from uas_coverage_env.env.actions.kind import ActionKind, Range
 from uas_coverage_env.env.actions.landing import refuse_landing_unless_departed
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
-from uas_coverage_env.world.commands import WRENCH as COMMAND
-from uas_coverage_env.world.commands import Wrench
 
 
 def _ranges(vehicle: VehicleParams, scenario: Scenario) -> tuple[Range, ...]:

@@ -47,9 +47,9 @@ def _place(scale, x, y, z, row, at):
 def _write_uas(arena, state, tables, learners, i, parameters, row):
     for k in range(row.shape[0]):
         row[k] = 0.0
-    for j in range(min(state.status.shape[0], row.shape[0] // _U_WIDTH)):
+    for j in range(min(state.uas.shape[0], row.shape[0] // _U_WIDTH)):
         x = state.x[j]
-        status = state.status[j]
+        status = state.uas[j].status
         scale = tables.scales[j]
         at = _U_WIDTH * j
         row[at + _U.valid] = 1.0

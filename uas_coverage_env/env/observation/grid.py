@@ -93,8 +93,8 @@ def _write(arena, state, tables, learners, i, parameters, row):
             c = _index(waypoint.position_m[1] - left_m, cell_m, n)
             _mark(row, _OPEN, n, r, c, min(1.0, waypoint.weight * tables.scales[i].per_heaviest))
     _block(arena, i, n, cell_m, top_m, left_m, x[Z], row)
-    for j in range(state.status.shape[0]):
-        if j != i and state.status[j] == FLYING:
+    for j in range(state.uas.shape[0]):
+        if j != i and state.uas[j].status == FLYING:
             r = _index(top_m - state.x[j, X], cell_m, n)
             c = _index(state.x[j, Y] - left_m, cell_m, n)
             _mark(row, _OTHERS, n, r, c, 1.0)

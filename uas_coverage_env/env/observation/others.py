@@ -42,8 +42,8 @@ def write_others(arena, state, tables, i, row):
     index = stack_array(K_UAS)
     away_m = stack_array(K_UAS)
     found = 0
-    for j in range(state.status.shape[0]):
-        if j != i and state.status[j] == FLYING:
+    for j in range(state.uas.shape[0]):
+        if j != i and state.uas[j].status == FLYING:
             other = state.x[j]
             m = apart_m(other[X] - x[X], other[Y] - x[Y], other[Z] - x[Z])
             found = insert(index, away_m, found, j, m)

@@ -79,11 +79,11 @@ def write_own(arena, state, tables, i, home_dod, open_share, row):
     row[_AT.rates] = within(x[WX] * scale.per_rate, -2.0, 2.0)
     row[_AT.rates + 1] = within(x[WY] * scale.per_rate, -2.0, 2.0)
     row[_AT.rates + 2] = within(x[WZ] * scale.per_yaw_rate, -2.0, 2.0)
-    row[_AT.reference] = within(state.reference[i, 0] * scale.per_v_xy, -2.0, 2.0)
-    row[_AT.reference + 1] = within(state.reference[i, 1] * scale.per_v_xy, -2.0, 2.0)
-    row[_AT.flying] = 1.0 if state.status[i] == FLYING else 0.0
-    row[_AT.departed] = 1.0 if state.departed[i] else 0.0
-    row[_AT.returning] = 1.0 if state.returning[i] else 0.0
+    row[_AT.reference] = within(state.uas[i].reference_mps[0] * scale.per_v_xy, -2.0, 2.0)
+    row[_AT.reference + 1] = within(state.uas[i].reference_mps[1] * scale.per_v_xy, -2.0, 2.0)
+    row[_AT.flying] = 1.0 if state.uas[i].status == FLYING else 0.0
+    row[_AT.departed] = 1.0 if state.uas[i].departed else 0.0
+    row[_AT.returning] = 1.0 if state.uas[i].returning else 0.0
     row[_AT.rank] = scale.rank
     row[_AT.dod] = within(x[DOD], 0.0, 1.0)
     row[_AT.polarisation] = within(x[U_TH], -1.0, 1.0)

@@ -59,8 +59,8 @@ def _others_near(state, i, targets, wanted, n, north_m, east_m, down_m, other_m2
         other_m2: (K_WAYPOINTS,) [m²] infinite; written.
         taken: (K_WAYPOINTS,) zero; written, 1 where one goes there.
     """
-    for j in range(state.status.shape[0]):
-        if j == i or state.status[j] != FLYING:
+    for j in range(state.uas.shape[0]):
+        if j == i or state.uas[j].status != FLYING:
             continue
         x = state.x[j, X]
         y = state.x[j, Y]
@@ -70,7 +70,7 @@ def _others_near(state, i, targets, wanted, n, north_m, east_m, down_m, other_m2
             dy = np.float32(east_m[c] - y)
             dz = np.float32(down_m[c] - z)
             other_m2[c] = min(other_m2[c], dx * dx + dy * dy + dz * dz)
-        if targets[j] >= 0 and not state.returning[j]:
+        if targets[j] >= 0 and not state.uas[j].returning:
             target = float(targets[j])
             for c in range(n):
                 taken[c] = _ONE if wanted[c] == target else taken[c]

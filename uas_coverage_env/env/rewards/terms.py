@@ -4,10 +4,10 @@ import math
 from collections.abc import Sequence
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
+from uas_coverage_env.entities.outcome import NONE
 from uas_coverage_env.env.rewards.term import RewardTerm
 from uas_coverage_env.world import FLYING, VELOCITY
 from uas_coverage_env.world.contacts import flew_judged_wrench
-from uas_coverage_env.world.outcome import NONE
 
 
 @inlined_kernel
@@ -20,7 +20,7 @@ def coverage(arena, state, tables, learners, scratch, i, parameters):
 def team_coverage(arena, state, tables, learners, scratch, i, parameters):
     """Weight of the waypoints that the others covered first."""
     covered_by_all = 0.0
-    for j in range(state.status.shape[0]):
+    for j in range(state.uas.shape[0]):
         covered_by_all += scratch.outcome[j].newly_covered_weight
     return covered_by_all - scratch.outcome[i].newly_covered_weight
 
@@ -51,14 +51,14 @@ def home(arena, state, tables, learners, scratch, i, parameters):
 def stranded(arena, state, tables, learners, scratch, i, parameters):
     """-1 when time ends and it still flies."""
     over = state.step[0] >= arena.rules[0].max_steps
-    return -1.0 if over and state.status[i] == FLYING else 0.0
+    return -1.0 if over and state.uas[i].status == FLYING else 0.0
 
 
 @inlined_kernel
 def filter_change(arena, state, tables, learners, scratch, i, parameters):
     """Minus what the safety filter changed."""
     event = scratch.outcome[i]
-    if event.filtered and not state.returning[i]:
+    if event.filtered and not state.uas[i].returning:
         return -_change(arena, i, scratch.commands[i], event.applied_command)
     return 0.0
 

@@ -1,10 +1,44 @@
 """True vehicles, drawn for each UAS and mission: planners and autopilots believe the files."""
 
+from collections.abc import Iterable
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.random import uniform
-from uas_coverage_env.scenario.uncertainty import Uncertainty
+from uas_coverage_env.features.feature import Disturbance, Feature
+from uas_coverage_env.features.table import FeatureTable
 from uas_coverage_env.vehicle import CAPACITY, LIFT, MASS, N_DEVIATIONS, THRUST
-from uas_coverage_env.world.disturbance import Disturbance
+
+Share = Annotated[float, Field(ge=0.0, le=0.5)]
+
+
+class Uncertainty(FeatureTable):
+    """Bounds within which the true vehicle of each UAS is drawn in each mission, uniformly.
+
+    Attributes:
+        mass: Largest relative error of mass, either way [-].
+        thrust: Likewise, of the motors' thrust at the same speed [-].
+        drag: Likewise, of the drag [-].
+        power: Likewise, of the electrical power at the same speed of the motors [-].
+        capacity_lost: Largest share of the battery's capacity that is lost with age [-].
+        resistance_gained: Largest share by which its resistances have grown with age [-].
+    """
+
+    table: ClassVar[str] = "uncertainty"
+
+    mass: Share = 0.0
+    thrust: Share = 0.0
+    drag: Share = 0.0
+    power: Share = 0.0
+    capacity_lost: Share = 0.0
+    resistance_gained: Annotated[float, Field(ge=0.0, le=5.0)] = 0.0
+
+    def features(self) -> Iterable[Feature]:
+        """The true vehicles; none where all bounds are zero."""
+        return () if self == Uncertainty() else (uncertainty(self),)
+
 
 _DRAWN = N_DEVIATIONS  # place in the memory
 

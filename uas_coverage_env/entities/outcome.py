@@ -1,9 +1,9 @@
 """What happened to each UAS in one step."""
 
 from uas_coverage_env.compiled.memory import record_dtype
+from uas_coverage_env.entities.codes import ContactKind
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
 from uas_coverage_env.vehicle import N_DEVIATIONS, N_INPUTS
-from uas_coverage_env.world.codes import ContactKind
-from uas_coverage_env.world.commands import COMMAND_DTYPE
 
 NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY, FAULT, LIMITS = map(int, ContactKind)
 

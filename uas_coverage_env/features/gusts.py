@@ -7,9 +7,8 @@ import math
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.random import uniform
-from uas_coverage_env.disturbances.wind import wind_velocity_mps
-from uas_coverage_env.scenario.air import Wind
-from uas_coverage_env.world.disturbance import Disturbance
+from uas_coverage_env.features.feature import Disturbance
+from uas_coverage_env.features.wind import Wind, wind_velocity_mps
 
 _FULL_TURN = 2.0 * math.pi
 _AT_S, _LASTS_S, _PEAK, _PER_GUST = 0, 1, 2, 5  # parameters of each gust; its peak is NED

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import record_dtype
-from uas_coverage_env.world.codes import CommandKind
+from uas_coverage_env.entities.codes import CommandKind
 
 Mode = Literal["covering", "transit", "return"]
 

@@ -1,152 +1,154 @@
 """The state of the world, and the part of it that a planner sees."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
-from uas_coverage_env.compiled.memory import Memory, Values
+from uas_coverage_env.compiled.memory import Memory, Values, record_dtype
+from uas_coverage_env.compiled.views import replaced
+from uas_coverage_env.entities.codes import UasStatus
 from uas_coverage_env.vehicle import N_STATES, PSI
-from uas_coverage_env.world.codes import UasStatus
-from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
-from uas_coverage_env.world.events import (
-    EVERY,
-    N_BIASES,
-    N_DELAYED,
-    N_HEARD,
-    NEVER,
-    write_responds,
-)
 
 ABSENT, FLYING, LANDED, LOST, SWAPPING = map(int, UasStatus)
 
+STATUS_NAMES = tuple(status.name.lower() for status in UasStatus if status != ABSENT)
+
 WIND, SINK, CONSUMPTION, EXPECTED, EXPECTED_DOD = 0, 2, 3, 4, 7
-"""Places in `WorldState.belief`: wind north and east [m/s], of which drag and every other steady
+"""Places in the belief of a UAS: wind north and east [m/s], of which drag and every other steady
 horizontal force are taken to come; change of the vertical speed in a step that the model does not
 know [m/s]; consumption over that of the model, less 1 [-]; and what is expected at the next sample,
 velocity north, east, down [m/s], and depth of discharge [-]."""
 
 N_BELIEF = EXPECTED_DOD + 1
 
-PACK_NUMBER, PACK_READY, PACK_COVERED, PACK_OUT = range(4)
-"""Places in `WorldState.packs`: which of its packs a UAS flies with, from 0 on; the sample at which
-it has the next one; whether it has covered anything with this one; and how many UAS were lost or
-had landed for good at its take-off."""
+EVERY = -2
+"""In place of the index of a UAS: all of them."""
 
-N_PACK = PACK_OUT + 1
+NEVER = 2**62
+"""The sample of what does not happen, and the steps of what does not end."""
 
-STATUS_NAMES = tuple(status.name.lower() for status in UasStatus if status != ABSENT)
+UAS_STATE_DTYPE = record_dtype(
+    [
+        # [m/s] velocity that the inner loop tracks now, north and east
+        ("reference_mps", "f8", (2,)),
+        # what the inner loop believes of disturbances, see `WIND`; zero where none is declared
+        ("belief", "f8", (N_BELIEF,)),
+        # FLYING, LANDED, LOST or SWAPPING; ABSENT in a batch, where a mission has fewer UAS
+        ("status", "i8"),
+        # it takes no command before this sample
+        ("responds_from_step", "i8"),
+        # has been farther from its start than the landing distance
+        ("departed", "?"),
+        # return mode has it now
+        ("returning", "?"),
+        # the safety filter replaced its last command
+        ("filtered", "?"),
+    ]
+)
+
+EVENT_STATE_DTYPE = record_dtype(
+    [
+        # the sample at which it happens
+        ("step", "i8"),
+        # whom it happens to: the index of a UAS, or EVERY
+        ("uas", "i8"),
+        # the state of the generator that it draws from
+        ("random", "u8", (1,)),
+    ]
+)
+
+PACK_STATE_DTYPE = record_dtype(
+    [
+        # which of its packs a UAS flies with, from 0 on
+        ("number", "i8"),
+        # the sample at which it has the next one
+        ("ready_step", "i8"),
+        # how many UAS were lost or had landed for good at its take-off
+        ("out", "i8"),
+        # it has covered something with this one
+        ("covered", "?"),
+    ]
+)
 
 
 class WorldState(NamedTuple):
-    """Everything that changes from step to step; the arrays are written in place."""
+    """Everything that changes from step to step; the arrays are written in place.
+
+    A record of each entity, and the paper's states and what is uncovered as arrays: models and
+    vector instructions take them so.
+    """
 
     x: Annotated[NDArray[np.float64], "U", N_STATES]
     """The paper's states, in the order of `vehicle.layout`."""
-    reference: Annotated[NDArray[np.float64], "U", 2]
-    """[m/s] velocity that the inner loop tracks now, north and east."""
-    belief: Annotated[NDArray[np.float64], "U", N_BELIEF]
-    """What the inner loop believes of disturbances, see `WIND` and the names beside it. Zero where
-    none is declared."""
-    status: Annotated[NDArray[np.int64], "U", Values(ABSENT, SWAPPING)]
-    """FLYING, LANDED, LOST or SWAPPING; ABSENT in a batch, where a mission has fewer UAS than
-    others."""
-    departed: Annotated[NDArray[np.bool_], "U"]
-    """Has been farther from its start than the landing distance."""
-    returning: Annotated[NDArray[np.bool_], "U"]
-    """Return mode has it now."""
-    filtered: Annotated[NDArray[np.bool_], "U"]
-    """The safety filter replaced its last command."""
+    uas: Annotated[
+        NDArray[np.void],
+        UAS_STATE_DTYPE,
+        "U",
+        {"status": Values(ABSENT, SWAPPING), "responds_from_step": Values(0, 2 * NEVER - 1)},
+    ]
     uncovered: Annotated[NDArray[np.bool_], "W"]
     """Waypoint still to be covered."""
     step: Annotated[NDArray[np.int64], 1, Values(0, "samples")]
     """Number of the sample, 0 at the start."""
-    disturbance_memory: Annotated[NDArray[np.float64], "U", "D", DISTURBANCE_MEMORY]
-    """What each of the D disturbances keeps for each UAS."""
-    disturbance_random: Annotated[NDArray[np.uint64], "U", "D", 1]
-    """The states of the generators that they draw from."""
-    event_step: Annotated[NDArray[np.int64], "E", Values(0, NEVER)]
-    """The sample at which each of the E events happens."""
-    event_uas: Annotated[NDArray[np.int64], "E", Values(EVERY, 2**31)]
-    """Whom it happens to: the index of a UAS, or EVERY."""
-    event_random: Annotated[NDArray[np.uint64], "E", 1]
-    """The states of the generators that they draw from."""
-    felt: Annotated[NDArray[np.float64], "S", N_STATES]
-    """What the inner loop flies by instead of `x`: for all UAS, or for none where they are known as
-    they are; likewise the next four."""
-    sensed: Annotated[NDArray[np.float64], "S", N_STATES]
-    """What the other parts of the autopilot fly by: the same with noise."""
-    told: Annotated[NDArray[np.float64], "S", N_STATES]
-    """What planners and learners are told of it: the same, later."""
-    delayed: Annotated[NDArray[np.float64], "S", N_DELAYED, N_STATES]
-    """The latest of `sensed`; that of sample k at k modulo their number."""
-    bias: Annotated[NDArray[np.float64], "S", N_BIASES]
-    """Errors that a mission draws, see `events.POSITION_BIAS` and the names beside it."""
-    sensing_random: Annotated[NDArray[np.uint64], "S", 1]
-    """The states of the generators that sensors draw from."""
-    heard: Annotated[NDArray[np.float64], "S", N_HEARD]
-    """The latest command that reached each UAS."""
-    packs: Annotated[NDArray[np.int64], "B", N_PACK]
-    """Of each UAS what is named beside `PACK_NUMBER`; of none where none swaps on its own."""
+    events: Annotated[
+        NDArray[np.void],
+        EVENT_STATE_DTYPE,
+        "E",
+        {"step": Values(0, NEVER), "uas": Values(EVERY, 2**31)},
+    ]
+    packs: Annotated[NDArray[np.void], PACK_STATE_DTYPE, "B"]
+    """Of each UAS; of none where none swaps on its own."""
     due_step: Annotated[NDArray[np.int64], "repeats", Values(0, 2**40)]
     """The sample at which each waypoint that was covered is asked for again, 0 where it is not; of
     none where no waypoint is to be covered more than once."""
+    estimated: Annotated[NDArray[np.float64], "S", N_STATES]
+    """What the inner loop flies by instead of `x`: for all UAS, or for none where they are known as
+    they are; likewise the next two."""
+    measured: Annotated[NDArray[np.float64], "S", N_STATES]
+    """What the other parts of the autopilot fly by: the same with noise."""
+    observed: Annotated[NDArray[np.float64], "S", N_STATES]
+    """What planners and learners are told of it: the same, later."""
+    memory: Annotated[NDArray[np.uint64], "memory words"]
+    """The records of the features that the mission has, see `features.feature`."""
 
     def copy(self) -> Self:
         """The same state in arrays of its own."""
         return self._make(array.copy() for array in self)
 
-    def as_told(self) -> Self:
+    def as_observed(self) -> Self:
         """The same arrays, `x` being what planners and learners are told."""
-        return self._replace(x=self.told) if len(self.told) else self
+        return self._replace(x=self.observed) if len(self.observed) else self
 
 
 STATE = Memory(WorldState)
+_with_x = replaced(STATE, "x")
 
 
 @inlined_kernel
-def as_felt(arena, state):
+def as_estimated(state):
     """The state as the inner loop knows it: `x` is what it flies by."""
-    if rarely(arena.sensing.shape[0] > 0):
-        return _with_x(state, state.felt)
+    if rarely(state.estimated.shape[0] > 0):
+        return _with_x(state, state.estimated)
     return _with_x(state, state.x)
 
 
 @inlined_kernel
-def as_sensed(arena, state):
-    """The state as return mode, guidance and safety filter know it: `x` is what is sensed."""
-    if rarely(arena.sensing.shape[0] > 0):
-        return _with_x(state, state.sensed)
+def as_measured(state):
+    """The state as return mode, guidance and safety filter know it: `x` is what is measured."""
+    if rarely(state.measured.shape[0] > 0):
+        return _with_x(state, state.measured)
     return _with_x(state, state.x)
 
 
 @inlined_kernel
-def as_told(arena, state):
+def as_observed(state):
     """The state as learners know it: `x` is what they are told."""
-    if rarely(arena.sensing.shape[0] > 0):
-        return _with_x(state, state.told)
+    if rarely(state.observed.shape[0] > 0):
+        return _with_x(state, state.observed)
     return _with_x(state, state.x)
-
-
-@inlined_kernel
-def _with_x(state, x):
-    return WorldState(
-        x, state.reference, state.belief, state.status, state.departed, state.returning,
-        state.filtered, state.uncovered, state.step, state.disturbance_memory,
-        state.disturbance_random, state.event_step, state.event_uas, state.event_random,
-        state.felt, state.sensed, state.told, state.delayed, state.bias, state.sensing_random,
-        state.heard, state.packs, state.due_step,
-    )  # fmt: skip
-
-
-def responding(arena: Any, state: WorldState) -> NDArray[np.bool_]:
-    """(U,) which UAS take commands in the coming step."""
-    responds = np.ones(len(arena.uas), dtype=np.bool_)
-    if len(arena.events):
-        write_responds(arena, state, responds)
-    return responds
 
 
 @dataclass(frozen=True, slots=True)

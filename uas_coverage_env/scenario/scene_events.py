@@ -1,13 +1,13 @@
 """Events that change the scene: what is to be covered, what is in the way, where home is."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import Field
 
-from uas_coverage_env.scenario.events.table import Effect, EventTable, OfUas, Scene
+from uas_coverage_env.compiled.kernels import rare_kernel
+from uas_coverage_env.features.event import EventTable, OfUas, happens
+from uas_coverage_env.features.feature import Feature, Point
 from uas_coverage_env.scenario.fields import (
     Distance_m,
     Length_m,
@@ -26,6 +26,16 @@ from uas_coverage_env.scenario.fields import (
 T = TypeVar("T", MovingObstacle, Uas)
 
 
+@rare_kernel
+def _drop(arena, state, outcome, f):
+    for e in range(arena.events.shape[0]):
+        if arena.events[e].feature == f and happens(state, e):
+            dropped = int(arena.events[e].values[0])
+            state.uncovered[dropped] = False
+            if state.due_step.shape[0] > 0:
+                state.due_step[dropped] = 0
+
+
 class WaypointDropped(EventTable):
     """A waypoint is not to be covered any more.
 
@@ -34,14 +44,17 @@ class WaypointDropped(EventTable):
         waypoint: Its place among the waypoints, from 0 on.
     """
 
+    feature: ClassVar = Feature("waypoint_dropped", {Point.MOVED: _drop})
+
     kind: Literal["waypoint_dropped"]
     waypoint: Annotated[int, Field(ge=0, le=10**6)]
 
-    def effect(self) -> Effect:
-        """It is open no more."""
-        return Effect("drop", values=(float(self.waypoint),))
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The waypoint."""
+        return (float(self.waypoint),)
 
-    def mistakes(self, scenario: Scene) -> Iterator[str]:
+    def mistakes(self, scenario: Any) -> Iterator[str]:
         """A waypoint that there is not."""
         n = len(scenario.waypoints)
         if self.waypoint >= n:
@@ -65,7 +78,7 @@ class WaypointAdded(EventTable):
     radius_m: Length_m
     weight: Annotated[float, Field(gt=0.0, le=1e6)] = 1.0
 
-    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Any, time_s: float, uas: int) -> dict[str, Any]:
         """The waypoint comes last."""
         new = Waypoint(position_m=self.position_m, radius_m=self.radius_m, weight=self.weight)
         return {"waypoints": (*scenario.waypoints, new)}
@@ -88,7 +101,7 @@ class ObstacleAdded(EventTable):
     safe_distance_m: Distance_m
     vertices_m: Points_m
 
-    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Any, time_s: float, uas: int) -> dict[str, Any]:
         """The obstacle comes last."""
         return {"obstacles": (*scenario.obstacles, self._body(Obstacle))}
 
@@ -113,7 +126,7 @@ class NoFlyZoneAdded(ObstacleAdded):
 
     kind: Literal["no_fly_zone"]  # pyrefly: ignore[bad-override]
 
-    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Any, time_s: float, uas: int) -> dict[str, Any]:
         """The zone comes last among the obstacles."""
         return {"obstacles": (*scenario.obstacles, self._body(NoFlyZone))}
 
@@ -141,7 +154,7 @@ class MovingObstacleAdded(EventTable):
     position_m: Position_m
     velocity_mps: Velocity_mps
 
-    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Any, time_s: float, uas: int) -> dict[str, Any]:
         """The obstacle comes last; until now it has stood where it appears."""
         new = MovingObstacle(
             name=self.name,
@@ -172,7 +185,7 @@ class MovingObstacleTurns(EventTable):
     moving_obstacle: Name
     velocity_mps: Velocity_mps
 
-    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Any, time_s: float, uas: int) -> dict[str, Any]:
         """Its schedule ends with this velocity."""
         turn = ScheduledVelocity(from_s=time_s, velocity_mps=self.velocity_mps)
         return {
@@ -184,7 +197,7 @@ class MovingObstacleTurns(EventTable):
             )
         }
 
-    def mistakes(self, scenario: Scene) -> Iterator[str]:
+    def mistakes(self, scenario: Any) -> Iterator[str]:
         """A moving obstacle that there is not."""
         known = [obstacle.name for obstacle in scenario.moving_obstacles]
         if self.moving_obstacle not in known:
@@ -205,7 +218,7 @@ class HomeClosed(OfUas):
     kind: Literal["home_closed"]
     alternative_m: Position_m
 
-    def revised(self, scenario: Scene, time_s: float, uas: int) -> dict[str, Any]:
+    def revised(self, scenario: Any, time_s: float, uas: int) -> dict[str, Any]:
         """Its start is the other place."""
         fleet = list(scenario.uas)
         fleet[uas] = _with(fleet[uas], start_m=self.alternative_m)
@@ -220,3 +233,14 @@ def _with(entry: T, **changes: Any) -> T:
     # checked before; and a vehicle file may be elsewhere by now
     kind: Any = type(entry)
     return kind.model_construct(**{**dict(entry), **changes})
+
+
+KINDS = (
+    WaypointDropped,
+    WaypointAdded,
+    ObstacleAdded,
+    NoFlyZoneAdded,
+    MovingObstacleAdded,
+    MovingObstacleTurns,
+    HomeClosed,
+)

@@ -1,0 +1,34 @@
+"""What few missions have: wind, faults, sensors with errors, events; a file each.
+
+A file holds a feature's table in scenario files, its records, its memory and its kernels at named
+points of the step (`feature.Point`).
+"""
+
+from uas_coverage_env.compiled.random import normal, uniform
+from uas_coverage_env.features.dryden import turbulence
+from uas_coverage_env.features.event import EventTable, OfUas
+from uas_coverage_env.features.feature import DISTURBANCE_MEMORY, Disturbance, Feature, Point
+from uas_coverage_env.features.gusts import discrete_gusts, random_gusts
+from uas_coverage_env.features.parameter_errors import uncertainty
+from uas_coverage_env.features.table import DisturbanceTable, FeatureTable
+from uas_coverage_env.features.wind import constant_wind, mean_wind, wind_velocity_mps
+
+__all__ = [
+    "DISTURBANCE_MEMORY",
+    "Disturbance",
+    "DisturbanceTable",
+    "EventTable",
+    "Feature",
+    "FeatureTable",
+    "OfUas",
+    "Point",
+    "constant_wind",
+    "discrete_gusts",
+    "mean_wind",
+    "normal",
+    "random_gusts",
+    "turbulence",
+    "uncertainty",
+    "uniform",
+    "wind_velocity_mps",
+]
