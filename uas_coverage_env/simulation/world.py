@@ -24,8 +24,8 @@ from uas_coverage_env.simulation.scenes import (
 from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
 from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
 from uas_coverage_env.world.arena import Arena, build_arena
-from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
-from uas_coverage_env.world.events import begin_events, is_eventful
+from uas_coverage_env.world.commands import COMMAND_DTYPE, GO_TO, KIND_NAMES, Command, pack
+from uas_coverage_env.world.events import begin_events, goes_home, is_eventful
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
 from uas_coverage_env.world.packs import packs_left, swap_steps_left, swaps_alone
 from uas_coverage_env.world.state import (
@@ -155,6 +155,7 @@ class World:
         self._state = self._start.copy()
         self._changes = changes_scene(scenario)
         self._nonlinear = dynamics == "nonlinear"
+        self._goes_to = goes_home(scenario)
         self._prepare()
         self._seed = 0
         self.reset(seed)
@@ -231,9 +232,14 @@ class World:
             )
         elif not commands.flags.c_contiguous:
             commands = commands.copy()
+        if not self._goes_to and GO_TO in commands["kind"].tolist():
+            self._goes_to, self._step = True, None
         if self._step is None:
-            # not before: environments have a world, too, and a step of their own
-            self._assistants = assistants(self.return_mode, self.safety_filter)
+            # not before: environments have a world, too, and a step of their own; and guidance is
+            # as much to compile as all the rest, for commands that may never come
+            self._assistants = assistants(
+                self.return_mode, self.safety_filter, goes_to=self._goes_to
+            )
             code = disturbance_code(self.disturbances)
             self._at = np.array([*MISSION.addresses_of(self.arena, self._state), *code])
         outcome = self._fresh_outcome()

@@ -175,8 +175,8 @@ def heed(arena, state, outcome):
     Args:
         arena: The arena.
         state: The state; the commands that are heard are written.
-        outcome: (U,) of OUTCOME_DTYPE with the commands given; applied_command and grounded are
-            written.
+        outcome: (U,) of OUTCOME_DTYPE with the commands given; applied_command, returning and
+            grounded are written.
     """
     step = state.step[0]
     for i in range(state.status.shape[0]):
@@ -209,6 +209,7 @@ def heed(arena, state, outcome):
             if then == RETURN:
                 command.values[0] = HOME
             command.returning = then == RETURN
+        outcome[i].returning = command.returning
 
 
 @rare_kernel
