@@ -1,4 +1,5 @@
 import copy
+import json
 import os
 import pickle
 import subprocess
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 from small_worlds import meadow, mover
 
-from uas_coverage_env.scenario import load_scenario
+from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, GoTo, SwarmState, Velocity, Wrench
 
@@ -183,3 +185,42 @@ def test_a_mission_can_be_flown_beyond_its_last_step():
         world.step({"uas_1": Velocity(0.0, 0.0, 1.0)})
     assert world.state.step[0] == 80
     assert world.swarm_state().moving_position_m.shape == (1, 3)
+
+
+@pytest.fixture
+def guided(monkeypatch):
+    """Whether guidance was asked for, each time that a world asked for assistants."""
+    asked = []
+
+    def noted(*given, goes_to):
+        asked.append(goes_to)
+        return assistants(*given, goes_to=goes_to)
+
+    monkeypatch.setattr("uas_coverage_env.simulation.world.assistants", noted)
+    return asked
+
+
+def test_guidance_is_compiled_once_a_command_names_a_place(guided):
+    world, same = World(meadow()), World(meadow())
+    same.step({"uas_1": GoTo(0)})
+    same.reset()
+    guided.clear()
+    north, home = Velocity(3.0, 0.0, 9.0), Velocity(-1.0, 0.0, 9.0, "return")
+    for command in (north, north, home, GoTo(0), north, GoTo(None)):
+        flown = world.step({"uas_1": command})
+        assert flown.tobytes() == same.step({"uas_1": command}).tobytes()
+        assert flown["returning"][0] == (command in (home, GoTo(None)))
+    assert guided == [False, True]
+
+
+def test_where_an_event_may_send_a_uas_home_there_is_guidance_from_the_start(guided):
+    lost = {"kind": "radio_lost", "at_s": 1.0, "uas": "uas_1", "for_s": 9.0}
+    fields = meadow().model_dump(mode="json", by_alias=True)
+    for then in ("hover", "return"):
+        world = World(
+            Scenario.model_validate_json(json.dumps({**fields, "events": [lost | {"then": then}]}))
+        )
+        for _ in range(4):
+            flown = world.step({"uas_1": Velocity(3.0, 0.0, 9.0)})
+        assert flown["returning"][0] == (then == "return")
+    assert guided == [False, True]

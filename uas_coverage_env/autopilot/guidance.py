@@ -299,7 +299,7 @@ def steer(arena, state, nonlinear, outcome):
             command.kind = GO_TO
             command.values[0] = HOME
             command.returning = True
-        outcome[i].returning = command.returning
+            outcome[i].returning = True
         if command.kind == GO_TO:
             target = int(command.values[0])
             stop = comes_to_rest(arena, state, target)

@@ -51,13 +51,14 @@ class Compilations:
         listener: Told once the process has spent more than PATIENCE_S.
         purpose: What they are for, in words.
         n_compiled: Kernels compiled so far, each of its parts counted.
+        spent_s: What that has taken [s].
     """
 
     def __init__(self) -> None:
         self.listener = _say_it_once()
         self.purpose = "this program"
         self.n_compiled = 0
-        self._spent_s = 0.0
+        self.spent_s = 0.0
         self._since_s = 0.0
         self._depth = 0
         self._compiles = False
@@ -84,7 +85,7 @@ class Compilations:
             if self._depth == 0 and self._compiles:
                 if self._patience_is_over():
                     self.listener(None)
-                self._spent_s += time.perf_counter() - self._since_s
+                self.spent_s += time.perf_counter() - self._since_s
 
     def begun(self) -> None:
         """A kernel, or a part of it, is not on the disk."""
@@ -107,7 +108,7 @@ class Compilations:
             self.listener(_SHARE_OF_PARTS * min(len(self._made) / max(self._n_parts, 1), 1.0))
 
     def _patience_is_over(self) -> bool:
-        return self._spent_s + time.perf_counter() - self._since_s > PATIENCE_S
+        return self.spent_s + time.perf_counter() - self._since_s > PATIENCE_S
 
 
 COMPILATIONS = Compilations()

@@ -50,6 +50,7 @@ def _hear(arena, state, outcome, f):
             if then == _RETURN:
                 command.values[0] = HOME
             command.returning = then == _RETURN
+        outcome[i].returning = command.returning
 
 
 @rare_kernel

@@ -83,9 +83,9 @@ def begin_step(state, commands, outcome):
         event.separation_m = math.inf
         event.fence_clearance_m = math.inf
         event.filtered = False
-        event.returning = False
         event.grounded = False
         given = commands[i]
+        event.returning = given.returning
         applied = event.applied_command
         applied.kind = given.kind
         for k in range(4):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
-from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, GO_TO, KIND_NAMES, Command, pack
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import (
     FLYING,
@@ -39,6 +39,7 @@ from uas_coverage_env.simulation.step import (
 )
 from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
 from uas_coverage_env.world.arena import Arena, build_arena
+from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.packs import (
     mission_features,
     packs_left,
@@ -164,6 +165,7 @@ class World:
         self._state = self._start.copy()
         self._changes = changes_scene(scenario)
         self._nonlinear = dynamics == "nonlinear"
+        self._goes_to = goes_home(scenario)
         self._prepare()
         self._seed = 0
         self.reset(seed)
@@ -242,9 +244,14 @@ class World:
             )
         elif not commands.flags.c_contiguous:
             commands = commands.copy()
+        if not self._goes_to and GO_TO in commands["kind"].tolist():
+            self._goes_to, self._step = True, None
         if self._step is None:
-            # not before: environments have a world, too, and a step of their own
-            self._assistants = assistants(self.return_mode, self.safety_filter)
+            # not before: environments have a world, too, and a step of their own; and guidance is
+            # as much to compile as all the rest, for commands that may never come
+            self._assistants = assistants(
+                self.return_mode, self.safety_filter, goes_to=self._goes_to
+            )
         outcome = self._fresh_outcome()
         arguments = (self._addresses(), commands, self._nonlinear, self._assistants, outcome)
         if self._step is None:
