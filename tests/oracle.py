@@ -92,9 +92,9 @@ def expected_step(scenario, state, wrenches, returning, judged=()):
     """
     step = int(state.step[0])
     start = state.x[:, :3]
-    flying = [i for i, status in enumerate(state.status) if status == FLYING]
+    flying = [i for i, status in enumerate(state.uas["status"]) if status == FLYING]
     results = [
-        Expected(x=x.copy(), status=int(s)) for x, s in zip(state.x, state.status, strict=True)
+        Expected(x=x.copy(), status=int(s)) for x, s in zip(state.x, state.uas["status"], strict=True)
     ]
     for i in flying:
         _fly(scenario.vehicles[i], scenario.dt_s, wrenches[i], results[i])
@@ -114,7 +114,7 @@ def expected_step(scenario, state, wrenches, returning, judged=()):
             if uncovered[w] and near:
                 uncovered[w] = False
                 results[i].covered.append(w)
-    departed = state.departed.copy()
+    departed = state.uas["departed"].copy()
     for i in flying:
         home = np.array(scenario.uas[i].start_m)
         if i not in whole:

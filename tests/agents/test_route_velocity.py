@@ -211,7 +211,7 @@ class ByLegFlight(RouteRunner):
         ahead[: len(targets)] = targets
         command = np.zeros(1, COMMAND_DTYPE)[0]
         if not steer_along(
-            routes.view.arena, u, state.x[u], state.reference[u], ahead, len(targets),
+            routes.view.arena, u, state.x[u], state.uas[u].reference_mps[:], ahead, len(targets),
             self._flight, 1, 0.0, command,
         ):  # fmt: skip
             return routes.onwards(u)

@@ -39,7 +39,7 @@ def moments(scenario, number):
     rng = np.random.default_rng(number)
     for _ in range(number):
         state = initial_state(scenario)
-        n_uas, n_waypoints = len(state.status), len(state.uncovered)
+        n_uas, n_waypoints = len(state.uas["status"]), len(state.uncovered)
         corners_m = np.array(scenario.geofence.vertices_m)
         low_m, high_m = corners_m.min(axis=0) + 5, corners_m.max(axis=0) - 5
         state.x[:, :3] = rng.uniform(low_m, high_m, (n_uas, 3))
@@ -48,13 +48,13 @@ def moments(scenario, number):
         state.step[0] = rng.integers(0, scenario.max_steps // 2)
         state.uncovered[:] = rng.random(n_waypoints) < rng.choice([0.1, 0.4, 0.9])
         state.uncovered[rng.integers(n_waypoints)] = True
-        state.returning[:] = rng.random(n_uas) < 0.2
-        state.status[rng.random(n_uas) < 0.1] = LANDED
+        state.uas["returning"][:] = rng.random(n_uas) < 0.2
+        state.uas["status"][rng.random(n_uas) < 0.1] = LANDED
         targets = rng.choice([HOME, NO_TARGET, *range(n_waypoints)], n_uas)
         if rng.random() < 0.4:
             targets[:] = rng.choice(np.flatnonzero(state.uncovered), n_uas)
         # it is the turn of the first
-        state.returning[0], state.status[0], targets[0] = False, 0, NO_TARGET
+        state.uas[0].returning, state.uas[0].status, targets[0] = False, 0, NO_TARGET
         blocked = rng.random(n_waypoints) < rng.choice([0.0, 0.3, 1.0])
         yield arena, legs, state, blocked, targets
 

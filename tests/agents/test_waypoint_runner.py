@@ -41,7 +41,7 @@ def in_training(scenario, weights):
     lanes, states = make_lanes(1, arenas)
     begin_lanes(
         arenas, legs, lanes, states, np.array([0]), np.array([0]),
-        np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.status.shape),
+        np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.uas.shape),
         True, assistants(True, True),
     )  # fmt: skip
     while lanes.decider[0] != NO_UAS:

@@ -60,7 +60,7 @@ class Teams:
         rng = np.random.default_rng(seed)
         begin_lanes(
             self.arenas, self.legs, self.lanes, self.states, np.arange(n), np.arange(n),
-            rng.random(shape) < covered, np.zeros(self.states.status.shape),
+            rng.random(shape) < covered, np.zeros(self.states.uas.shape),
             True, assistants(True, True),
         )  # fmt: skip
 
@@ -144,7 +144,7 @@ def test_a_uas_without_charge_for_the_way_is_not_sent():
     scenario = SCENARIOS[1]
     arenas, legs = pool_worlds([scenario]), pool_legs([scenario])
     lanes, states = make_lanes(1, arenas)
-    discharged = np.zeros(states.status.shape)
+    discharged = np.zeros(states.uas.shape)
     discharged[0, 0] = scenario.uas[0].dod_max - (1 - scenario.uas[0].soc_0) - 0.03
     begin_lanes(
         arenas, legs, lanes, states, np.array([0]), np.array([0]),
@@ -202,7 +202,7 @@ def test_places_and_directions_do_not_matter():
         lanes, states = make_lanes(1, arenas)
         begin_lanes(
             arenas, legs, lanes, states, np.array([0]), np.array([0]),
-            np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.status.shape),
+            np.zeros(states.uncovered.shape, dtype=bool), np.zeros(states.uas.shape),
             True, assistants(True, True),
         )  # fmt: skip
         rows.append(lanes.observation[0].copy())

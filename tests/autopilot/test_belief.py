@@ -39,7 +39,7 @@ def windy(wind_mps, from_deg, dynamics="lpv", **options):
         disturbances=(constant_wind(wind_mps, from_deg),),
         **options,
     )
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
     return world
 
 
@@ -49,7 +49,7 @@ def test_in_still_air_nothing_is_believed_and_nothing_changes():
         world = World(meadow(), disturbances=disturbances)
         for _ in range(8):
             world.step({"uas_1": Velocity(8.0, -3.0, 15.0)})
-        assert (world.state.belief == 0.0).all()
+        assert (world.state.uas["belief"] == 0.0).all()
         flights.append(world.state.x.copy())
     assert (flights[0] == flights[1]).all()
 
@@ -62,7 +62,7 @@ def test_a_hover_in_steady_wind_comes_to_rest_and_knows_the_wind(wind_mps, from_
         world.step(HOVER)
     towards = np.deg2rad(from_deg + 180.0)
     wind = wind_mps * np.array([np.cos(towards), np.sin(towards)])
-    np.testing.assert_allclose(world.state.belief[0, WIND : WIND + 2], wind, atol=0.05 * wind_mps)
+    np.testing.assert_allclose(world.state.uas["belief"][0, WIND : WIND + 2], wind, atol=0.05 * wind_mps)
     assert np.abs(world.state.x[0, VX : VZ + 1]).max() < 0.1
 
 
@@ -108,7 +108,7 @@ def test_commands_of_all_kinds_know_the_wind():
         if world.done:
             break
         world.step({"uas_1": GoTo(None)})
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def test_consumption_is_learned_within_its_bounds():

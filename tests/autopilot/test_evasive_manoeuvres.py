@@ -52,7 +52,7 @@ def space(size_m, dt_s, vehicle, walls, comes, uas_safe_distance_m=0.3):
 def hover(scenario, place_m, seconds, dynamics="lpv"):
     """Hover at a place; (contacts, breaches, time of the last sample [s])."""
     world = World(scenario, dynamics=dynamics, safety_filter=True)
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
     world.state.x[0, :3] = place_m
     contacts = breaches = 0
     while not world.done and world.time_s < seconds and not contacts:

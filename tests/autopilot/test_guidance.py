@@ -24,7 +24,7 @@ def visit(world, orders, max_steps=600):
             break
         commands = {}
         for i, name in enumerate(world.names):
-            if world.state.status[i] != FLYING:
+            if world.state.uas[i].status != FLYING:
                 continue
             while orders[i] and not world.state.uncovered[orders[i][0]]:
                 orders[i].pop(0)
@@ -47,7 +47,7 @@ def test_the_waypoints_of_the_village_are_flown_one_after_another():
     order = [w for k, row in enumerate(rows) for w in (row[::-1] if k % 2 else row) if w != 27]
     half = 21
     visit(world, [order[:half], order[half:]])
-    assert world.state.status.tolist() == [LANDED, LANDED]
+    assert world.state.uas["status"].tolist() == [LANDED, LANDED]
     assert np.flatnonzero(world.state.uncovered).tolist() in ([], [27])
 
 
@@ -59,7 +59,7 @@ def test_random_targets_across_the_village_end_in_no_contact(seed):
     rng = np.random.default_rng(seed)
     order = [w for w in rng.permutation(49) if w != 27][:12]
     visit(world, [order, []])
-    assert (world.state.status == LANDED).all()
+    assert (world.state.uas["status"] == LANDED).all()
     assert not world.state.uncovered[order].any()
 
 
@@ -69,7 +69,7 @@ def test_random_targets_in_generated_towns_end_in_no_contact(seed):
     world = World(scenario)
     order = np.random.default_rng(seed).permutation(25)[:10]
     visit(world, [order])
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert not world.state.uncovered[order].any()
 
 
@@ -156,10 +156,10 @@ def test_home_is_reached_slowly_enough_to_land():
     world = World(meadow([(20.0, 30.0, -1.0)]))
     world.state.x[0, :3] = 180.0, 170.0, -45.0
     world.state.x[0, [VX, VY]] = 8.0, 8.0
-    world.state.reference[0] = 8.0, 8.0
+    world.state.uas[0].reference_mps[:] = 8.0, 8.0
     for _ in fly(world, {"uas_1": GoTo(None)}, 70):
         pass
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert np.linalg.norm(world.state.x[0, :3] - world.scenario.uas[0].start_m) <= 2.0
 
 
@@ -190,7 +190,7 @@ def test_leaving_the_start_does_not_depend_on_other_commands():
     world = World(meadow([(100.0, 100.0, -1.0), (140.0, 140.0, -1.0)]))
     for _ in fly(world, {"uas_1": GoTo(0), "uas_2": Velocity(0.0, 0.0, 1.0)}, 5):
         pass
-    assert world.state.departed.tolist() == [True, False]
+    assert world.state.uas["departed"].tolist() == [True, False]
 
 
 def test_the_nonlinear_plant_is_guided_as_safely():
@@ -206,6 +206,6 @@ def test_the_nonlinear_plant_is_guided_as_safely():
     )
     breaches, clearance_m, _ = visit(world, [[0]])
     assert not world.state.uncovered[0]
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert breaches == 0
     assert clearance_m >= 2.36 - 1e-6

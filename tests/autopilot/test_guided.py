@@ -22,7 +22,7 @@ def test_the_velocity_of_a_goto_flies_as_the_goto_does(dynamics):
         state.x[:, :3] = rng.uniform(low, high, (2, 3))
         state.x[:, VX : VZ + 1] = rng.uniform(-2.5, 2.5, (2, 3))
         state.x[:, VX] *= 3.0
-        state.reference[:] = state.x[:, VX : VX + 2]
+        state.uas["reference_mps"][:] = state.x[:, VX : VX + 2]
         for mine, other in zip(twin.state, state, strict=True):
             mine[:] = other
         target = int(rng.integers(len(scenario.waypoints)))
@@ -36,7 +36,7 @@ def test_the_velocity_of_a_goto_flies_as_the_goto_does(dynamics):
         world.step(commands)
         twin.step(same)
         np.testing.assert_allclose(twin.state.x, world.state.x, rtol=1e-9, atol=1e-9)
-        np.testing.assert_array_equal(twin.state.status, world.state.status)
+        np.testing.assert_array_equal(twin.state.uas["status"], world.state.uas["status"])
     assert brakes > 3
 
 

@@ -24,12 +24,12 @@ def flown_home(mean_mps, obstacles=(), dynamics="lpv"):
     )
     world = World(scenario, dynamics=dynamics)
     world.state.x[0, :3] = AWAY_M
-    world.state.departed[:] = True
+    world.state.uas["departed"][:] = True
     way_m = [world.state.x[0, :3].copy()]
-    while world.state.status[0] == FLYING and len(way_m) < 250:
+    while world.state.uas[0].status == FLYING and len(way_m) < 250:
         world.step({"uas_1": GoTo(None)})
         way_m.append(world.state.x[0, :3].copy())
-    return way_m, world.state.status[0]
+    return way_m, world.state.uas[0].status
 
 
 @pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
@@ -75,7 +75,7 @@ def way_from(place_m, wind_mps):
         update={"wind": Wind(mean_mps=9.0, from_deg=0.0)}
     )
     world = World(scenario)
-    x, belief = world.state.x[0], world.state.belief[0]
+    x, belief = world.state.x[0], world.state.uas[0].belief[:]
     x[:3] = place_m
     belief[WIND] = -wind_mps
     return low_way(world.arena, 0, x, belief, *HOME_M[:2], -place_m[2], NEEDED_M)

@@ -38,7 +38,7 @@ def flown(world, target, max_steps=200):
 
 def put(world, place_m):
     world.state.x[0, :3] = place_m
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
 
 
 def test_what_stands_on_the_ground_overhangs_nothing():
@@ -57,7 +57,7 @@ def test_a_uas_below_a_slab_comes_home(place_m):
     world = World(meadow([START_M], obstacles=[SLAB]))
     put(world, place_m)
     assert flown(world, None) < 60
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def test_a_waypoint_below_a_slab_is_covered_and_left_again():
@@ -65,14 +65,14 @@ def test_a_waypoint_below_a_slab_is_covered_and_left_again():
     world = World(meadow([START_M], obstacles=[SLAB], waypoints=[target]))
     assert flown(world, 0) < 60
     assert flown(world, None) < 60
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def test_a_home_below_a_slab_is_reached_from_above_it():
     world = World(meadow([(100.0, 135.0, -1.0)], obstacles=[SLAB]))
     put(world, (100.0, 135.0, -30.0))
     assert flown(world, None) < 120
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def test_between_crowns_that_touch_there_is_a_way_out():
@@ -82,7 +82,7 @@ def test_between_crowns_that_touch_there_is_a_way_out():
     put(world, (101.0, 127.0, -3.0))
     assert is_below_overhang(world.arena, 101.0, 127.0, -3.0)
     assert flown(world, None) < 90
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def test_the_way_out_is_clear_and_ends_where_a_uas_can_climb():

@@ -20,7 +20,7 @@ def away_from_home(place_m, wind=None, return_mode=True, **options):
     """A UAS at a place, in wind, that is brought home from there."""
     scenario = meadow([(100.0, 30.0, -1.0)], waypoints=FAR, max_steps=900)
     world = World(scenario.model_copy(update={"wind": wind}), return_mode=return_mode, **options)
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
     world.state.x[0, :3] = place_m
     return world
 
@@ -30,7 +30,7 @@ def called(world, steps, altitude_m):
     samples = []
     for _ in range(steps):
         world.step({name: Velocity(0.0, 0.0, altitude_m) for name in world.active})
-        samples.append(bool(world.state.returning[0]))
+        samples.append(bool(world.state.uas[0].returning))
     return samples
 
 
@@ -50,7 +50,7 @@ def test_a_uas_that_is_short_of_charge_is_called_until_it_lands(dod, comes_home)
     samples = called(world, 60, 20.0)
     assert samples == sorted(samples)
     assert samples[-1] == comes_home
-    assert (world.state.status[0] == LANDED) == comes_home
+    assert (world.state.uas[0].status == LANDED) == comes_home
 
 
 @pytest.mark.parametrize(("return_mode", "is_lost"), [(True, False), (False, True)])
@@ -59,7 +59,7 @@ def test_a_wind_that_a_uas_cannot_hold_against_is_left_for_lower_air(return_mode
     world = away_from_home((110.0, 20.0, -20.0), wind, return_mode, safety_filter=True)
     world.state.x[0, DOD] = 0.05
     called(world, 400, 48.0)
-    assert (world.state.status[0] == LOST) == is_lost
+    assert (world.state.uas[0].status == LOST) == is_lost
 
 
 def called_from_dod(level):
@@ -88,12 +88,12 @@ def test_home_is_found_from_above_a_roof_right_below_the_ceiling(wind_mps):
         disturbances=(constant_wind(wind_mps, 180.0),) if wind_mps else None,
         safety_filter=True,
     )
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
     world.state.x[0, :3] = 75.0, 75.0, -48.4
     while not world.done:
         outcome = world.step({"uas_1": GoTo(None)})
         assert outcome["breaches"][0] == 0
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def flight_home(wind_mps, from_deg, dt_s, dynamics="lpv"):
@@ -101,13 +101,13 @@ def flight_home(wind_mps, from_deg, dt_s, dynamics="lpv"):
     scenario = meadow([(100.0, 30.0, -1.0)], waypoints=FAR, dt_s=dt_s)
     wind = (constant_wind(wind_mps, from_deg),) if wind_mps else None
     world = World(scenario, disturbances=wind, dynamics=dynamics)
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
     world.state.x[0, :3] = 100.0, 150.0, -10.0
     distances_m = []
     while not world.done:
         world.step({"uas_1": GoTo(None)})
         distances_m.append(float(np.hypot(*(world.state.x[0, [X, Y]] - (100.0, 30.0)))))
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     return distances_m
 
 

@@ -32,8 +32,8 @@ def test_a_uas_comes_home_before_its_battery_is_empty(return_mode):
     for _ in range(10):
         world.step(AWAY)
     fly_until_done(world, HOVER)
-    assert (world.state.status[0] == LANDED) == return_mode
-    assert world.state.returning[0] == return_mode
+    assert (world.state.uas[0].status == LANDED) == return_mode
+    assert world.state.uas[0].returning == return_mode
     if return_mode:
         # the reserve is not so large that the battery is left unused
         assert 0.56 < world.state.x[0, DOD] < 0.6
@@ -44,7 +44,7 @@ def test_a_uas_comes_home_before_the_mission_ends():
     for _ in range(10):
         world.step(AWAY)
     fly_until_done(world, HOVER)
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert 80 < world.state.step[0] <= 120
 
 
@@ -57,9 +57,9 @@ def test_all_come_home_when_everything_is_covered():
         if world.done:
             break
         outcome = world.step({"uas_1": Velocity(6.0, 0.0, 10.0)})
-        assert outcome["returning"][0] == world.state.returning[0]
+        assert outcome["returning"][0] == world.state.uas[0].returning
     assert not world.state.uncovered.any()
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def test_return_mode_stays_on_and_overrides_the_planner():
@@ -72,7 +72,7 @@ def test_return_mode_stays_on_and_overrides_the_planner():
         returning.append(bool(outcome["returning"][0]))
     first = returning.index(True)
     assert all(returning[first:])
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def test_without_return_mode_only_the_planner_returns():
@@ -81,7 +81,7 @@ def test_without_return_mode_only_the_planner_returns():
     assert not outcome["returning"][0]
     outcome = world.step({"uas_1": GoTo(None)})
     assert outcome["returning"][0]
-    assert not world.state.returning[0]
+    assert not world.state.uas[0].returning
 
 
 def test_the_time_home_grows_with_the_distance():
@@ -106,8 +106,8 @@ def test_a_whole_town_comes_home_from_a_random_walk():
                 name: Velocity(*rng.uniform([-10, -10, 5], [10, 10, 30])) for name in world.names
             }
         world.step({name: commands[name] for name in world.active})
-    assert (world.state.status == LANDED).all()
-    assert FLYING not in world.state.status
+    assert (world.state.uas["status"] == LANDED).all()
+    assert FLYING not in world.state.uas["status"]
 
 
 def budgeted(world, seconds):
@@ -121,7 +121,7 @@ def comes_home(world, command, max_steps=400):
         if world.done:
             break
         world.step({"uas_1": command})
-    return world.state.status[0] == LANDED
+    return world.state.uas[0].status == LANDED
 
 
 @pytest.mark.parametrize("budget_s", np.arange(18.0, 34.0, 0.25))
@@ -142,7 +142,7 @@ def test_a_uas_low_behind_a_high_roof_is_called_in_time_to_climb_over_it(budget_
     )
     assert not world.arena.obstacles["tall"].any()
     world.state.x[0, :3] = (90.0, 100.0, -3.0)
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
     budgeted(world, budget_s)
     assert comes_home(world, Velocity(12.0, 3.0, 3.0))
 

@@ -77,8 +77,8 @@ def test_an_air_taxi_flies_out_until_it_is_called_and_comes_home_at_full_speed(d
     world.state.x[0, DOD] = 0.2
     while not world.done:
         world.step({"taxi": GoTo(0)})
-        if world.state.returning[0]:
+        if world.state.uas[0].returning:
             speeds_mps.append(float(np.hypot(x[VX], x[VY])))
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert max(speeds_mps) > 29.0
     assert 0.6 < x[DOD] < 0.8

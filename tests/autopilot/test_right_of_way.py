@@ -42,7 +42,7 @@ def put(world, places_m):
     """Place the UAS at rest."""
     world.reset()
     world.state.x[:, [X, Y, Z]] = places_m
-    world.state.departed[:] = True
+    world.state.uas["departed"][:] = True
 
 
 def see_home(world, wishes, n_waiting=0, max_steps=150):
@@ -61,10 +61,10 @@ def see_home(world, wishes, n_waiting=0, max_steps=150):
     commands = np.zeros(len(world.names), COMMAND_DTYPE)
     contacts, apart_m, changed = 0, np.inf, 0
     for step in range(max_steps):
-        if state.status[0] != FLYING:
+        if state.uas[0].status != FLYING:
             break
         commands[0] = (VELOCITY, towards(CORNER_M, 0.4)(state.x[0]), False)
-        state.returning[0] = step >= n_waiting
+        state.uas[0].returning = step >= n_waiting
         for i in range(1, len(world.names)):
             commands[i] = (VELOCITY, wishes(state.x[0], i, state.x[i]), False)
         outcome = world.step(commands)
@@ -128,7 +128,7 @@ def test_mates_that_try_to_keep_a_uas_from_home_do_not_succeed(policy, n_uas):
     world = swarm(n_uas)
     put(world, around_corner(n_uas))
     contacts, apart_m, changed = see_home(world, policy, n_waiting=40)
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert contacts == 0
     assert apart_m >= KEPT_M - RESIDUE_M
     assert changed > 0
@@ -145,7 +145,7 @@ def test_nor_does_any_mixture_of_them_from_anywhere_around_a_corner(seed, n_uas,
     put(world, around_corner(n_uas, seed))
     policies = [POLICIES[name] for name in names]
     contacts, apart_m, _ = see_home(world, lambda x0, i, x: policies[i - 1](x0, i, x), n_waiting=40)
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert contacts == 0
     assert apart_m >= KEPT_M - RESIDUE_M
 
@@ -156,7 +156,7 @@ def test_a_uas_that_hovers_in_a_canyon_leaves_it_before_one_that_comes_home():
     )
     put(world, [(100.0, 160.0, -3.0), (100.0, 120.0, -3.0)])
     contacts, apart_m, changed = see_home(world, lambda *_: (0.0, 0.0, 3.0, 0.0))
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert contacts == 0
     assert apart_m >= KEPT_M - RESIDUE_M
     assert changed > 0
@@ -167,12 +167,12 @@ def test_two_on_their_way_home_through_a_canyon_pass_each_other():
         meadow([HOME_M, (100.0, 180.0, -1.0)], obstacles=CANYON, waypoints=OUT_OF_THE_WAY)
     )
     put(world, [(100.0, 170.0, -10.0), (100.0, 70.0, -10.0)])
-    world.state.returning[:] = True
+    world.state.uas["returning"][:] = True
     contacts = 0
     for _ in range(150):
         if not world.done:
             contacts += int(world.step(np.zeros(2, COMMAND_DTYPE))["contact"].any())
-    assert world.state.status.tolist() == [LANDED, LANDED]
+    assert world.state.uas["status"].tolist() == [LANDED, LANDED]
     assert contacts == 0
 
 
@@ -188,7 +188,7 @@ def test_a_mate_beside_the_way_home_is_left_in_peace_and_one_on_it_is_not():
     for aside_m in (0.0, 8.0):
         world = swarm(2)
         put(world, [(100.0, 160.0, -20.0), (100.0 + aside_m, 130.0, -20.0)])
-        world.state.returning[0] = True
+        world.state.uas[0].returning = True
         changed.append(hover(world, 10))
     assert changed == [True, False]
 
@@ -201,8 +201,8 @@ def test_no_uas_makes_way_for_one_that_is_not_called_home():
 
 def test_those_on_their_way_home_decide_first_and_those_that_do_not_fly_do_not_decide():
     state = World(meadow([(20.0 * k, 20.0, -1.0) for k in range(1, 6)])).state
-    state.returning[[1, 3, 4]] = True
-    state.status[1] = LANDED
+    state.uas["returning"][[1, 3, 4]] = True
+    state.uas[1].status = LANDED
     order = np.zeros(5, np.int64)
     assert decision_order(state, order) == (4, 2)
     assert order[:4].tolist() == [3, 4, 0, 2]

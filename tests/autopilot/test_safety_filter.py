@@ -75,7 +75,7 @@ def test_random_commands_with_both_assistants_harm_no_uas_and_all_come_home(name
         assert contacts == 0
         assert breaches == 0
         assert filtered > 0
-        assert (world.state.status == LANDED).all()
+        assert (world.state.uas["status"] == LANDED).all()
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

@@ -150,7 +150,7 @@ def test_a_lost_uas_gets_no_command_and_the_other_goes_on(small_town):
     planner.reset(MissionBrief.of(small_town), 0)
     world = World(small_town)
     assert set(planner.act(world.swarm_state())) == {"uas_1", "uas_2"}
-    world.state.status[1] = LOST
+    world.state.uas[1].status = LOST
     assert set(planner.act(world.swarm_state())) == {"uas_1"}
 
 

@@ -36,8 +36,8 @@ def test_the_others_cover_what_a_lost_uas_leaves():
 
 def test_a_lost_uas_is_lost_at_its_sample_and_covers_nothing_there():
     world = hovering(event("uas_lost", 2.0, uas="uas_2"))
-    assert after(world, 1).state.status.tolist() == [FLYING, FLYING]
-    assert after(world, 1).state.status.tolist() == [FLYING, LOST]
+    assert after(world, 1).state.uas["status"].tolist() == [FLYING, FLYING]
+    assert after(world, 1).state.uas["status"].tolist() == [FLYING, LOST]
 
 
 @RESPONSES
@@ -72,7 +72,7 @@ def test_a_wrench_is_not_held_on_without_a_radio():
 def test_a_uas_without_a_radio_may_return():
     world = after(hovering(event("radio_lost", 10.0, uas="uas_1", for_s=99.0, then="return")), 10)
     assert world.state.x[0, 0] - 40.0 > 12.0
-    assert after(world, 25, Velocity(0.0, 0.0, 20.0)).state.status.tolist() == [LANDED, FLYING]
+    assert after(world, 25, Velocity(0.0, 0.0, 20.0)).state.uas["status"].tolist() == [LANDED, FLYING]
 
 
 @RESPONSES
@@ -145,7 +145,7 @@ def test_a_uas_with_a_damaged_motor_draws_more_and_climbs_less_and_comes_home():
 
 def test_a_charge_that_is_lost_beyond_the_limit_loses_the_uas_to_its_battery():
     world = hovering(event("charge_lost", 1.0, uas="uas_1", share=0.9))
-    assert after(world, 1).state.status.tolist() == [LOST, FLYING]
+    assert after(world, 1).state.uas["status"].tolist() == [LOST, FLYING]
 
 
 def test_a_uas_without_satellites_drifts_as_said_and_comes_home():
@@ -282,7 +282,7 @@ def test_a_rate_draws_the_time_and_the_uas_with_the_seed():
 def test_events_of_one_time_happen_together():
     both = [event("uas_lost", 2.0, uas="uas_1"), event("charge_lost", 2.0, uas="uas_2", share=0.1)]
     world = after(hovering(*both), 2)
-    assert world.state.status.tolist() == [LOST, FLYING]
+    assert world.state.uas["status"].tolist() == [LOST, FLYING]
     assert world.state.x[1, DOD] > 0.1
 
 

@@ -45,7 +45,7 @@ def compare(scenario, asked, n_steps, **settings):
             uncovered = seen.worlds.uncovered[lane, : len(swarm.uncovered)]
             different += int((observed != episode.observation).sum())
             different += int((seen.worlds.x[lane, :, :3] != episode.positions_m).sum())
-            different += int((seen.worlds.status[lane] != swarm.status).sum())
+            different += int((seen.worlds.uas["status"][lane] != swarm.status).sum())
             different += int((uncovered != swarm.uncovered).sum())
             different += int((seen.rewards[lane] != rewards).sum())
             brief = MissionBrief.of(missions.scenario_of(lane))

@@ -50,7 +50,7 @@ def compare(ground, ask=None, **settings):
         asked = rng.uniform(-1, 1, (N_LANES, 2, size)) if ask is None else ask(k)
         missions.step(asked)
         seen = missions.missions
-        statuses |= set(seen.worlds.status.ravel().tolist())
+        statuses |= set(seen.worlds.uas["status"].ravel().tolist())
         contacts |= set(seen.learners.report[:, :, CONTACT].ravel().tolist())
         for lane, episode in enumerate(episodes):
             if ended[lane]:

@@ -62,7 +62,7 @@ def assert_is(batch, lane, env, observations, rewards=None, infos=None):
                 np.testing.assert_array_equal(info["action_mask"], mask)
     n_uas = len(scenario.uas)
     assert not batch.observation[lane, n_uas:].any()
-    assert (batch.worlds.status[lane, n_uas:] == ABSENT).all()
+    assert (batch.worlds.uas["status"][lane, n_uas:] == ABSENT).all()
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_what_a_lost_uas_saw_last_stays_also_after_going_on_from_a_state():
     batch.reset(seed=3)
     for step in range(14):
         batch.step(random_actions(batch, step))
-    status = batch.worlds.status
+    status = batch.worlds.uas["status"]
     waits = (status == LOST) & (status == FLYING).any(axis=1, keepdims=True)
     assert waits.any()
     last, mission = batch.observation.copy(), batch.lanes.mission.copy()
@@ -289,5 +289,5 @@ def test_lanes_tell_which_uas_fly():
     batch = CoverageBatch(1, MIXED)
     batch.reset(scenarios=[1])
     np.testing.assert_array_equal(batch.flying, [[True, False, False]])
-    assert (batch.worlds.status[0] == [FLYING, ABSENT, ABSENT]).all()
+    assert (batch.worlds.uas["status"][0] == [FLYING, ABSENT, ABSENT]).all()
     assert batch.swarm_state(0).names == ("uas_1",)

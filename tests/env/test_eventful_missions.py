@@ -52,8 +52,8 @@ def test_what_happens_in_a_lane_happens_in_a_single_mission_of_its_seed(action):
             for agent, row in seen.items():
                 i = env.possible_agents.index(agent)
                 np.testing.assert_array_equal(observation[lane, i], row)
-                assert infos[agent]["status"] == batch.worlds.status[lane, i]
-    assert (batch.worlds.status == UasStatus.LOST).any()
+                assert infos[agent]["status"] == batch.worlds.uas[lane, i].status
+    assert (batch.worlds.uas["status"] == UasStatus.LOST).any()
 
 
 def test_a_uas_that_an_event_takes_ends_with_a_fault_and_no_violation():

@@ -119,8 +119,8 @@ def test_an_expert_is_asked_on_the_states_that_another_policy_visits():
         commands = expert.act(swarm)
         labels = env.actions_of(commands, clip=True)
         # what the labels fly from here is what the expert's commands fly from here
-        world.state.x[:], world.state.reference[:] = swarm.x, swarm.reference_mps
-        world.state.status[:], world.state.departed[:] = swarm.status, swarm.departed
+        world.state.x[:], world.state.uas["reference_mps"][:] = swarm.x, swarm.reference_mps
+        world.state.uas["status"][:], world.state.uas["departed"][:] = swarm.status, swarm.departed
         world.state.uncovered[:], world.state.step[0] = swarm.uncovered, swarm.step
         world.step(commands)
         student = copy.deepcopy(env)

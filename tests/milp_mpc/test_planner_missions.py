@@ -66,7 +66,7 @@ def test_every_uas_lands_where_it_stands_once_there_is_nothing_to_do():
     world = World(scenario)
     assert not world.state.uncovered.any()
     fly(world, planner(scenario), 4)
-    assert (world.state.status == LANDED).all()
+    assert (world.state.uas["status"] == LANDED).all()
     assert np.abs(world.state.x[:, :3] - starts).max() < 1.0
 
 
@@ -82,7 +82,7 @@ def finished():
 def test_a_mission_ends_with_everything_covered_and_every_uas_landed(finished):
     outcomes, world, _ = finished
     assert not world.state.uncovered.any()
-    assert (world.state.status == LANDED).all()
+    assert (world.state.uas["status"] == LANDED).all()
     assert (outcomes["contact"] == 0).all()
     assert outcomes["breaches"].sum() == 0
     assert outcomes["newly_covered"].sum(axis=0).tolist() == [1, 0]
@@ -92,7 +92,7 @@ def test_a_uas_that_is_never_needed_lands_where_it_stands(finished):
     outcomes, world, _ = finished
     assert outcomes["landed"].sum(axis=0).tolist() == [1, 1]
     assert np.linalg.norm(world.state.x[1, :3] - world.arena.uas["home_m"][1]) < 2.0
-    assert not world.state.departed[1]
+    assert not world.state.uas[1].departed
 
 
 def test_a_landed_uas_is_no_part_of_the_plans_that_follow(finished):

@@ -26,7 +26,7 @@ def learnt(wind, steps=20, height_m=30.0):
 def test_it_is_the_wind_that_the_inner_loop_finds_out():
     turbulent = Wind(mean_mps=5.0, from_deg=200.0, turbulence=1.0)
     known, world = learnt(turbulent)
-    np.testing.assert_allclose(known.wind_mps, world.state.belief[:, :2], atol=1e-6)
+    np.testing.assert_allclose(known.wind_mps, world.state.uas["belief"][:, :2], atol=1e-6)
     assert np.hypot(*known.wind_mps[0]) > 3.0
 
 

@@ -45,8 +45,8 @@ class Flight:
     def behind(self, *position_m):
         """All UAS on the ground but the first, which has covered everything and is there."""
         self.world.state.x[0, :3] = position_m
-        self.world.state.departed[0] = True
-        self.world.state.status[1:] = LANDED
+        self.world.state.uas[0].departed = True
+        self.world.state.uas["status"][1:] = LANDED
         self.world.state.uncovered[:] = False
         return self
 
@@ -67,7 +67,7 @@ def covered(state):
 
 
 def landed(state):
-    return not (state.status == FLYING).any()
+    return not (state.uas["status"] == FLYING).any()
 
 
 @pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-guided"])
@@ -85,7 +85,7 @@ def test_what_lies_behind_a_wall_is_covered(planner):
 def test_from_behind_walls_and_through_gaps_a_uas_comes_home(planner, name, behind_m):
     flight = Flight(name, planner).behind(*behind_m).until(landed, 90)
     assert landed(flight.world.state)
-    assert flight.world.state.status[0] == LANDED
+    assert flight.world.state.uas[0].status == LANDED
     assert flight.breaches == 0
 
 
@@ -120,7 +120,7 @@ def test_charge_for_the_way_home_overrules_every_plan(monkeypatch):
     flight.world.state.uncovered[:] = True
     flight.world.state.x[0, DOD] = 0.70
     flight.until(landed, 100)
-    assert flight.world.state.status[0] == LANDED
+    assert flight.world.state.uas[0].status == LANDED
     assert Reason.CHARGE in flight.reasons
     first = flight.reasons.index(Reason.CHARGE)
     assert set(flight.reasons[first:]) == {Reason.CHARGE}, "it is not sent out again"
@@ -132,6 +132,6 @@ def test_a_uas_that_came_no_nearer_to_home_flies_slowly_only_at_its_end(monkeypa
     monkeypatch.setattr(Attempts, "is_hard", lambda *_: True)
     flight = Flight("wall", "milp-mpc").behind(70.0, 62.0, -10.0).until(landed, 100)
     assert landed(flight.world.state)
-    assert flight.world.state.status[0] == LANDED
+    assert flight.world.state.uas[0].status == LANDED
     assert Reason.STANDSTILL in flight.reasons
     assert len(flight.reasons) <= 45, "78 where all of the way home is flown slowly"

@@ -37,7 +37,7 @@ def test_torques_within_their_limits_that_lead_beyond_tilt_and_speed_are_noticed
     assert exceeded(outcomes[0]) == set()
     assert {"tilt", "speed"} <= exceeded(outcomes[2])
     assert outcomes[2]["contact"][0] == 0
-    assert world.state.status[0] == FLYING
+    assert world.state.uas[0].status == FLYING
 
 
 @pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])

@@ -75,13 +75,13 @@ def assert_same(world, before, outcome, commands):
     )
     state = world.state
     np.testing.assert_array_equal(state.uncovered, uncovered)
-    np.testing.assert_array_equal(state.departed, departed)
+    np.testing.assert_array_equal(state.uas["departed"], departed)
     assert state.step[0] == before.step[0] + 1
     for i, want in enumerate(expected):
         got = outcome[i]
         np.testing.assert_allclose(state.x[i], want.x, rtol=0, atol=1e-9)
         np.testing.assert_allclose(got["u"], want.u, rtol=0, atol=1e-9)
-        assert state.status[i] == want.status
+        assert state.uas[i].status == want.status
         assert got["landed"] == (want.status == LANDED and before.status[i] == FLYING)
         assert got["voltage_V"] == pytest.approx(want.voltage_V, abs=1e-9)
         assert got["current_A"] == pytest.approx(want.current_A, abs=1e-9)

@@ -175,7 +175,7 @@ def test_after_a_wrench_the_inner_loop_goes_on_from_the_velocity_reached():
     for torque in (0.004, -0.004, 0.0):
         world.step({"uas_1": Wrench(0.0, 0.0, torque, 0.0)})
     assert np.abs(world.state.x[0, 3]) > 0.5
-    np.testing.assert_array_equal(world.state.reference[0], world.state.x[0, 3:5])
+    np.testing.assert_array_equal(world.state.uas[0].reference_mps[:], world.state.x[0, 3:5])
 
 
 def test_a_mission_can_be_flown_beyond_its_last_step():

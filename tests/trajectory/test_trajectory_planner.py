@@ -189,7 +189,7 @@ def test_the_waypoints_of_a_lost_uas_are_covered_by_the_others():
         world.step(commands)
         if step == 6:
             lost = int(swarm.status.argmin())
-            world.state.status[lost] = 2
+            world.state.uas[lost].status = 2
     assert not world.swarm_state().uncovered.any()
 
 

@@ -153,9 +153,9 @@ def test_only_a_uas_that_can_cover_it_waits_for_it():
     while world.state.uncovered.any():
         commands = {"uas_1": GoTo(0), "uas_2": GoTo(1)}
         world.step({name: commands[name] for name in world.active})
-    while world.state.status[1] == FLYING or world.state.status[0] == FLYING:
+    while world.state.uas[1].status == FLYING or world.state.uas[0].status == FLYING:
         world.step({name: home for name in world.active})
-    assert world.state.status[0] == SWAPPING or len(world.known.waypoints) == 3
+    assert world.state.uas[0].status == SWAPPING or len(world.known.waypoints) == 3
 
 
 @pytest.mark.parametrize(("other_flies", "packs_used"), [(True, 2), (False, 3)])
@@ -168,14 +168,14 @@ def test_one_whose_last_sortie_covered_nothing_waits_while_another_flies(other_f
             world.step({"uas_1": GoTo(w), "uas_2": HOVERS})
     used = 1
     for _ in range(250):
-        flies = world.state.status[0] == FLYING
-        away = flies and used == 2 and not world.state.departed[0]
+        flies = world.state.uas[0].status == FLYING
+        away = flies and used == 2 and not world.state.uas[0].departed
         commands = {
             "uas_1": Velocity(0.0, -3.0, 30.0) if away else home,
             "uas_2": HOVERS if other_flies else home,
         }
         world.step({name: commands[name] for name in world.active})
-        used += not flies and world.state.status[0] == FLYING
+        used += not flies and world.state.uas[0].status == FLYING
     assert world.state.uncovered.tolist() == [False, False, True, True]
     assert used == packs_used
 

@@ -25,12 +25,12 @@ def test_a_fast_uas_does_not_jump_through_a_thin_wall():
     wall = box("wall", (106.0, 80.0, -30.0), (106.01, 120.0, 0.0))
     world = World(meadow([(100.0, 100.0, -10.0)], obstacles=[wall]))
     world.state.x[0, VX] = 12.0
-    world.state.reference[0] = 12.0, 0.0
+    world.state.uas[0].reference_mps[:] = 12.0, 0.0
     outcome = world.step({"uas_1": Velocity(12.0, 0.0, 10.0)})
     assert world.state.x[0, X] > 106.01 + 0.36
     assert contacts(outcome) == ["obstacle"]
     assert outcome["contact_with"][0] == 0
-    assert world.state.status[0] == LOST
+    assert world.state.uas[0].status == LOST
 
 
 def test_the_same_flight_beside_the_wall_is_no_contact():
@@ -38,18 +38,18 @@ def test_the_same_flight_beside_the_wall_is_no_contact():
     world = World(meadow([(100.0, 90.0, -10.0)], obstacles=[wall]))
     world.state.x[0, :2] = 100.0, 100.0
     world.state.x[0, VX] = 12.0
-    world.state.reference[0] = 12.0, 0.0
+    world.state.uas[0].reference_mps[:] = 12.0, 0.0
     outcome = world.step({"uas_1": Velocity(12.0, 0.0, 10.0)})
     assert contacts(outcome) == ["none"]
     assert outcome["obstacle_clearance_m"][0] == pytest.approx(0.4, abs=1e-6)
-    assert world.state.status[0] == FLYING
+    assert world.state.uas[0].status == FLYING
 
 
 def test_two_uas_that_swap_places_collide():
     world = World(meadow([(96.0, 100.0, -10.0), (104.0, 100.0, -10.0)]))
     for i, speed in enumerate((8.0, -8.0)):
         world.state.x[i, VX] = speed
-        world.state.reference[i] = speed, 0.0
+        world.state.uas[i].reference_mps[:] = speed, 0.0
     outcome = world.step({"uas_1": Velocity(8.0, 0.0, 10.0), "uas_2": Velocity(-8.0, 0.0, 10.0)})
     assert world.state.x[0, X] > world.state.x[1, X] + 5.0
     assert contacts(outcome) == ["uas", "uas"]
@@ -97,12 +97,12 @@ def test_more_than_the_allowed_depth_of_discharge_loses_the_uas():
     world.state.x[0, DOD] = 0.5 - 1e-4
     world.step(hover(world))
     assert world.state.x[0, DOD] > 0.5
-    assert world.state.status[0] == LOST
+    assert world.state.uas[0].status == LOST
     world.reset()
     world.state.x[0, DOD] = 0.5 - 2e-3
     outcome = world.step(hover(world))
     assert contacts(outcome) == ["none"]
-    assert world.state.status[0] == FLYING
+    assert world.state.uas[0].status == FLYING
 
 
 def test_a_breach_is_counted_and_no_uas_is_lost():

@@ -44,9 +44,9 @@ def test_a_lost_uas_covers_nothing_at_the_sample_of_its_loss():
     for obstacles, status in (((), FLYING), ((wall,), LOST)):
         world = World(meadow([(100.0, 100.0, -10.0)], obstacles=obstacles, waypoints=[beyond]))
         world.state.x[0, VX] = 12.0
-        world.state.reference[0] = 12.0, 0.0
+        world.state.uas[0].reference_mps[:] = 12.0, 0.0
         outcome = world.step({"uas_1": Velocity(12.0, 0.0, 10.0)})
-        assert world.state.status[0] == status
+        assert world.state.uas[0].status == status
         assert outcome["newly_covered"][0] == (status == FLYING)
         assert world.state.uncovered[0] == (status == LOST)
 
@@ -57,7 +57,7 @@ def test_a_waypoint_that_two_reach_at_once_counts_once():
     world = World(meadow(starts, waypoints=[both]))
     for i in range(2):
         world.state.x[i, VX] = 12.0
-        world.state.reference[i] = 12.0, 0.0
+        world.state.uas[i].reference_mps[:] = 12.0, 0.0
     outcome = world.step({name: Velocity(12.0, 0.0, 10.0) for name in world.names})
     assert outcome["newly_covered"].tolist() == [1, 0]
     assert outcome["newly_covered_weight"].tolist() == [3.0, 0.0]
@@ -71,13 +71,13 @@ def test_a_uas_that_has_not_left_does_not_land_by_itself():
     world = World(meadow([(100.0, 100.0, -10.0)]))
     for _ in range(3):
         world.step(hold())
-    assert world.state.status[0] == FLYING
+    assert world.state.uas[0].status == FLYING
 
 
 def test_a_uas_that_returns_lands_without_having_left():
     world = World(meadow([(100.0, 100.0, -10.0)]))
     outcome = world.step(hold("return"))
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
     assert outcome["landed"][0]
     assert outcome["returning"][0]
     assert outcome["current_A"][0] > 10.0
@@ -86,30 +86,30 @@ def test_a_uas_that_returns_lands_without_having_left():
 
 def test_a_uas_that_has_left_lands_when_it_is_back_and_slow():
     world = World(meadow([(100.0, 100.0, -10.0)]))
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
     world.state.x[0, :3] = 101.0, 101.0, -10.0
     world.step(hold())
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 @pytest.mark.parametrize(("offset_m", "speed_mps"), [(2.1, 0.0), (0.5, 0.9)])
 def test_a_uas_too_far_or_too_fast_does_not_land(offset_m, speed_mps):
     world = World(meadow([(100.0, 100.0, -10.0)]))
-    world.state.departed[0] = True
+    world.state.uas[0].departed = True
     world.state.x[0, 0] += offset_m
     world.state.x[0, VX] = speed_mps
-    world.state.reference[0] = speed_mps, 0.0
+    world.state.uas[0].reference_mps[:] = speed_mps, 0.0
     world.step({"uas_1": Velocity(speed_mps, 0.0, 10.0, "return")})
-    assert world.state.status[0] == FLYING
+    assert world.state.uas[0].status == FLYING
 
 
 def test_leaving_is_remembered():
     world = World(meadow([(100.0, 100.0, -10.0)]))
     world.step(hold())
-    assert not world.state.departed[0]
+    assert not world.state.uas[0].departed
     for _ in range(6):
         world.step({"uas_1": Velocity(3.0, 0.0, 10.0)})
-    assert world.state.departed[0]
+    assert world.state.uas[0].departed
 
 
 def test_a_landed_uas_rests_and_its_battery_stays_as_it_is():
@@ -135,5 +135,5 @@ def test_a_landed_uas_is_no_obstacle_to_others():
     world.step(both)
     world.state.x[1, :3] = world.state.x[0, :3]
     outcome = world.step({"uas_2": both["uas_2"]})
-    assert world.state.status.tolist() == [LANDED, FLYING]
+    assert world.state.uas["status"].tolist() == [LANDED, FLYING]
     assert outcome["breaches"][1] == 0

@@ -41,7 +41,7 @@ def fly(world, until, commands):
 
 
 def has(i, status):
-    return lambda world: world.state.status[i] == status
+    return lambda world: world.state.uas[i].status == status
 
 
 HOVERS = Velocity(0.0, 0.0, 10.0)
@@ -52,15 +52,15 @@ BACK = {"uas_1": HOME, "uas_2": HOVERS}
 def first_sortie(world):
     """The first UAS covers a waypoint and lands; the second hovers."""
     fly(world, lambda world: not world.state.uncovered[0], FIRST)
-    return fly(world, lambda world: world.state.status[0] != FLYING, BACK)
+    return fly(world, lambda world: world.state.uas[0].status != FLYING, BACK)
 
 
 def test_it_flies_again_with_a_fresh_pack_when_its_swap_is_over():
     world = World(mission())
     landed = first_sortie(world)
     seen = world.swarm_state()
-    assert world.state.status.tolist() == [SWAPPING, FLYING]
-    assert seen.status.tolist() == [LANDED, FLYING]
+    assert world.state.uas["status"].tolist() == [SWAPPING, FLYING]
+    assert seen.uas["status"].tolist() == [LANDED, FLYING]
     assert seen.active == ("uas_2",)
     assert seen.x[0, DOD] > 0.2
     place_m = seen.x[0, :3].copy()
@@ -69,14 +69,14 @@ def test_it_flies_again_with_a_fresh_pack_when_its_swap_is_over():
     assert seen.active == ("uas_1", "uas_2")
     assert seen.x[0, DOD] == pytest.approx(0.2)
     assert (seen.x[0, :3] == place_m).all()
-    assert not seen.departed[0]
-    assert not seen.returning[0]
+    assert not seen.uas[0].departed
+    assert not seen.uas[0].returning
 
 
 def test_without_a_pack_left_landing_is_final():
     world = World(mission(packs=1))
     first_sortie(world)
-    assert world.state.status.tolist() == [LANDED, FLYING]
+    assert world.state.uas["status"].tolist() == [LANDED, FLYING]
 
 
 def test_a_sortie_that_covers_nothing_is_the_last_until_another_uas_is_lost():
@@ -85,11 +85,11 @@ def test_a_sortie_that_covers_nothing_is_the_last_until_another_uas_is_lost():
     first_sortie(world)
     fly(world, has(0, FLYING), BACK)
     away = {"uas_1": Velocity(3.0, 0.0, 30.0), "uas_2": HOVERS}
-    fly(world, lambda world: world.state.departed[0], away)
+    fly(world, lambda world: world.state.uas[0].departed, away)
     fly(world, has(0, SWAPPING), BACK)
     again = fly(world, has(0, FLYING), BACK)
     assert again == 90
-    assert world.state.status[1] == LOST
+    assert world.state.uas[1].status == LOST
 
 
 def test_the_mission_goes_on_while_one_swaps_and_ends_when_no_uas_is_going_to_fly():
@@ -99,9 +99,9 @@ def test_the_mission_goes_on_while_one_swaps_and_ends_when_no_uas_is_going_to_fl
     assert not world.done
     fly(world, has(0, FLYING), BACK)
     away = {"uas_1": Velocity(3.0, 0.0, 30.0)}
-    fly(world, lambda world: world.state.departed[0], away)
+    fly(world, lambda world: world.state.uas[0].departed, away)
     fly(world, lambda world: world.done, BACK)
-    assert world.state.status.tolist() == [LANDED]
+    assert world.state.uas["status"].tolist() == [LANDED]
     assert world.state.uncovered.any()
 
 
@@ -123,7 +123,7 @@ def test_no_uas_takes_off_that_could_not_be_back_in_time():
     far = waypoint((160.0, 20.0, -10.0), 4.0)
     world = World(mission(waypoints=(NEAR, far), swap_s=20.0, max_steps=50))
     first_sortie(world)
-    assert world.state.status[0] == LANDED
+    assert world.state.uas[0].status == LANDED
 
 
 def test_it_waits_until_one_that_flies_past_is_gone():
@@ -133,7 +133,7 @@ def test_it_waits_until_one_that_flies_past_is_gone():
     for step in range(12):
         world.state.x[1, [X, Y, Z]] = beside_m  # closer than 5 m and two radii
         world.step({"uas_2": HOVERS})
-        assert world.state.status[0] == SWAPPING, step
+        assert world.state.uas[0].status == SWAPPING, step
     world.state.x[1, [X, Y, Z]] = (150.0, 150.0, -10.0)
     assert fly(world, has(0, FLYING), BACK) == landed + 13
 
@@ -212,6 +212,6 @@ def test_where_its_home_was_closed_it_swaps_at_the_other_place():
     closed = event("home_closed", 5.0, uas="uas_1", alternative_m=other_m)
     world = World(mission(closed))
     first_sortie(world)
-    assert world.state.status[0] == SWAPPING
+    assert world.state.uas[0].status == SWAPPING
     fly(world, has(0, FLYING), BACK)
     np.testing.assert_allclose(world.state.x[0, :3], other_m, atol=2.0)

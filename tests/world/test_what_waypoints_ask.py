@@ -51,7 +51,7 @@ def test_at_rest_it_counts_which_uas_is_there_with_what_and_how_high(asked, carr
 def test_a_uas_that_is_too_fast_covers_nothing(speed_mps, covered):
     world = World(over(asking((130.0, 100.0, -20.0), 29.0, max_speed_mps=3.5)))
     world.state.x[0, VX] = speed_mps
-    world.state.reference[0] = speed_mps, 0.0
+    world.state.uas[0].reference_mps[:] = speed_mps, 0.0
     outcome = world.step({"uas_1": Velocity(speed_mps, 0.0, 20.0)})
     assert (np.linalg.norm(world.state.x[0, VX : VZ + 1]) <= 3.5) == covered
     assert outcome["newly_covered"].tolist() == [int(covered)]
