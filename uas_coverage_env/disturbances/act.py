@@ -17,7 +17,7 @@ from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.disturbances.wind import blow
-from uas_coverage_env.vehicle import LIFT, N_DEVIATIONS, TAU_Z, clip_wrench
+from uas_coverage_env.vehicle import LIFT, TAU_Z, clip_wrench
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.disturbance import Disturbance
 from uas_coverage_env.world.outcome import OUTCOME_DTYPE
@@ -129,13 +129,10 @@ def _act_on_all(arena, state, disturbances, outcome):
 
 @inlined_kernel
 def clear(event):
-    """Begin with still air, no force, and the vehicle that is believed."""
+    """Begin with still air and no force."""
     for axis in range(3):
         event.wind_mps[axis] = 0.0
         event.force_N[axis] = 0.0
-    for k in range(N_DEVIATIONS):
-        event.deviation[k] = 0.0
-    event.rotor_power = False
     event.dod_lost = 0.0
 
 
@@ -143,13 +140,6 @@ def clear(event):
 def check_and_clip(arena, i, event):
     """Refuse what is not finite, and keep the inputs of UAS i within the limits."""
     total = event.dod_lost
-    for k in range(N_DEVIATIONS):
-        total += abs(event.deviation[k])
-        if event.deviation[k] <= -1.0:
-            raise ValueError(
-                "disturbances leave a UAS without mass, thrust, drag, power or battery: a "
-                "deviation is -1 or less; correct their kernels"
-            )
     for axis in range(3):
         total += abs(event.wind_mps[axis]) + abs(event.force_N[axis])
     for k in range(LIFT, TAU_Z + 1):

@@ -65,6 +65,8 @@ class DrawnPool:
         self.sizes["S"] = source.room.n_uas if eventful else 0
         swaps = any(swaps_alone(scenario) for scenario in source.examples)
         self.sizes["B"] = source.room.n_uas if swaps else 0
+        perturbed = any(each.perturbs for own in acting for each in own)
+        self.sizes["true vehicles"] = source.room.n_uas if perturbed else 0
         repeats = any(scenario.asks_again for scenario in source.examples)
         self.sizes["repeats"] = self.sizes["W"] if repeats else 0
         self.changes = any(changes_scene(scenario) for scenario in source.examples)
@@ -124,12 +126,13 @@ class DrawnPool:
             scenario = chosen[lane] if chosen else None
             before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
             scenario = scenario or self._source.draw(rng)
-            fitted_to(self.disturbances, self.settings.disturbances_in(scenario))
-            self._check_events(scenario)
+            own = self.settings.disturbances_in(scenario)
+            fitted_to(self.disturbances, own)
+            self._check_events(scenario, any(each.perturbs for each in own))
             missions.append(DrawnMission(lane, scenario, before, rng))
         self.install(missions)
 
-    def _check_events(self, scenario: Scenario) -> None:
+    def _check_events(self, scenario: Scenario, perturbs: bool) -> None:
         """Refuse more events, or others, than there is room for."""
         n_events, n_sensed = len(scenario.events), len(scenario.uas) * is_eventful(scenario)
         if (
@@ -138,12 +141,13 @@ class DrawnPool:
             or goes_home(scenario) > self.goes_home
             or swaps_alone(scenario) > (self.sizes["B"] > 0)
             or scenario.asks_again > (self.sizes["repeats"] > 0)
+            or perturbs > (self.sizes["true vehicles"] > 0)
             or changes_scene(scenario) > self.changes
         ):
             raise ValueError(
-                f"scenario {scenario.name!r} has more events, [sensing], [sorties] or "
-                f"again_after_s than the {len(self._source.examples)} examples that this batch "
-                f"was made for"
+                f"scenario {scenario.name!r} has more events, [sensing], [sorties], "
+                f"true vehicles or again_after_s than the {len(self._source.examples)} examples "
+                f"that this batch was made for"
             )
 
     def scene_of(self, scene: int) -> Scenario:

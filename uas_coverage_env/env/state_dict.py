@@ -1,6 +1,6 @@
 """Arrays of a checkpoint that are loaded: checked, since kernels check no index."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -36,13 +36,22 @@ def check_like(state: Mapping[str, NDArray[Any]], own: Mapping[str, NDArray[Any]
             )
 
 
+def _numbers_of(state: Mapping[str, NDArray[Any]]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Its arrays, of records each of their fields as `name.field`."""
+    for name, array in state.items():
+        if array.dtype.names is None:
+            yield name, array
+        else:
+            yield from ((f"{name}.{field}", array[field]) for field in array.dtype.names)
+
+
 def check_values(state: Mapping[str, NDArray[Any]], limits: Limits) -> None:
     """Refuse numbers that are not finite, and indices that point at nothing.
 
     Raises:
         ValueError: An array holds such a value; names both.
     """
-    for name, given in state.items():
+    for name, given in _numbers_of(state):
         wrong = np.zeros(np.shape(given), dtype=np.bool_)
         if np.issubdtype(given.dtype, np.floating):
             wrong = ~np.isfinite(given)

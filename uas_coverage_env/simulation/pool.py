@@ -67,7 +67,7 @@ def pool_worlds(
             disturbances=disturbances,
             judges_wrenches=judges_wrenches,
         )
-        start = initial_state(scenario, len(disturbances))
+        start = initial_state(scenario, arena)
         begin_mission(arena, start, np.zeros(len(scenario.uas), dtype=OUTCOME_DTYPE))
         arenas.append(arena)
         starts.append(start)

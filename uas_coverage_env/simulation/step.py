@@ -13,10 +13,6 @@ from uas_coverage_env.vehicle import (
     DOD,
     N_INPUTS,
     X,
-    add_force,
-    deviates,
-    deviating_lpv_step,
-    deviating_plant_step,
     enter_air,
     face_course,
     leave_air,
@@ -140,12 +136,12 @@ def write_all_inputs(arena, state, nonlinear, outcome):
             _write_believed_inputs(arena, state, felt, nonlinear, i, outcome)
 
 
-@rare_kernel
-def _move_deviating(vehicle, event, nonlinear, x, u):
-    """Fly one step of a vehicle that is another than it is believed to be."""
-    if nonlinear:
-        return deviating_plant_step(vehicle, event.deviation, x, u, x)
-    return deviating_lpv_step(vehicle, event.deviation, event.rotor_power, x, u, x)
+@inlined_kernel
+def _flown_vehicle(arena, state, i):
+    """The vehicle that flies: the true one, where that may be another than is believed."""
+    if rarely(state.true_vehicles.shape[0] > 0):
+        return state.true_vehicles[i]
+    return arena.vehicles[i]
 
 
 @rare_kernel
@@ -155,13 +151,10 @@ def _move_nonlinear(vehicle, x, u):
 
 
 @rare_kernel
-def _be_pushed(vehicle, belief, event, step, dod_before, x):
+def _be_pushed(vehicle, flown, belief, event, step, dod_before, x):
     """What wind, forces and faults add to a step that was flown in the air, and what is learnt."""
     leave_air(vehicle, x, event.wind_mps)
-    if deviates(event.deviation):
-        add_force(vehicle, event.deviation, x, event.force_N)
-    else:
-        push(vehicle, x, event.force_N)
+    push(flown, x, event.force_N)
     x[DOD] += event.dod_lost
     learn(vehicle, belief, step, dod_before, x)
 
@@ -172,18 +165,16 @@ def _move(arena, state, nonlinear, disturbed, i, outcome):
     x = state.x[i]
     event = outcome[i]
     u = event.u[:]
-    vehicle = arena.vehicles[i]
+    vehicle, flown = arena.vehicles[i], _flown_vehicle(arena, state, i)
     dod_before = x[DOD]
     if rarely(disturbed):
         enter_air(x, event.wind_mps)
-    if rarely(disturbed) and (event.rotor_power or deviates(event.deviation)):
-        voltage_V, current_A = _move_deviating(vehicle, event, nonlinear, x, u)
-    elif rarely(nonlinear):
-        voltage_V, current_A = _move_nonlinear(vehicle, x, u)
+    if rarely(nonlinear):
+        voltage_V, current_A = _move_nonlinear(flown, x, u)
     else:
-        voltage_V, current_A = lpv_step(vehicle, x, u, x)
+        voltage_V, current_A = lpv_step(flown, x, u, x)
     if rarely(disturbed):
-        _be_pushed(vehicle, state.belief[i], event, state.step[0], dod_before, x)
+        _be_pushed(vehicle, flown, state.belief[i], event, state.step[0], dod_before, x)
     event.voltage_V = voltage_V
     event.current_A = current_A
     event.energy_Wh = voltage_V * current_A * (arena.rules[0].dt_s / 3600.0)

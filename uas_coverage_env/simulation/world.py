@@ -43,10 +43,17 @@ Dynamics = Literal["lpv", "nonlinear"]
 _OUTCOMES_IN_BLOCK = 256
 
 
-def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
-    """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off."""
+def initial_state(scenario: Scenario, arena: Arena | None = None) -> WorldState:
+    """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off.
+
+    Args:
+        scenario: The scenario.
+        arena: The same as arrays, with what disturbs it; None: nothing does.
+    """
     n_uas = len(scenario.uas)
-    sizes = {"U": n_uas, "W": len(scenario.waypoints), "D": n_disturbances}
+    sizes = {"U": n_uas, "W": len(scenario.waypoints), "D": 0, "true vehicles": 0}
+    if arena is not None:
+        sizes |= {"D": len(arena.disturbances), "true vehicles": len(arena.perturbed)}
     sizes |= {"E": len(scenario.events), "S": n_uas if is_eventful(scenario) else 0}
     sizes |= {"B": n_uas if swaps_alone(scenario) else 0}
     sizes["repeats"] = len(scenario.waypoints) if scenario.asks_again else 0
@@ -59,6 +66,8 @@ def initial_state(scenario: Scenario, n_disturbances: int = 0) -> WorldState:
             x[DOD], x[U_TH] = flown.dod, flown.u_th_V
     state.status[:] = FLYING
     state.uncovered[:] = True
+    if arena is not None:
+        state.true_vehicles[:] = arena.vehicles[arena.perturbed]
     if len(state.sensed):
         # where and how they start is known
         state.felt[:] = state.sensed[:] = state.told[:] = state.delayed[:, 0] = state.x
@@ -150,7 +159,7 @@ class World:
         self._measured_m, self._judges_wrenches = measured_m, bool(judges_wrenches)
         self.known, self.revisions = scenario, 0
         self.arena = self._first_arena = self._arena_of(scenario)
-        self._start = initial_state(scenario, len(self.disturbances))
+        self._start = initial_state(scenario, self.arena)
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
         self._changes = changes_scene(scenario)

@@ -156,6 +156,8 @@ class Arena(NamedTuple):
     """As many as `WorldState` has room for; that is the same in all missions of a pool."""
     disturbance_parameters: Annotated[NDArray[np.float64], "parameters"]
     """Of all disturbances."""
+    perturbed: Annotated[NDArray[np.int64], "true vehicles"]
+    """The UAS whose vehicles disturbances may make others than is believed: all, or none."""
     events: Annotated[NDArray[np.void], EVENT_DTYPE, "E"]
     sensing: Annotated[NDArray[np.void], SENSING_DTYPE, "S"]
     """One for each UAS, or none where they are known as they are."""
@@ -236,6 +238,7 @@ def build_arena(
         node_distance_m=corners.distance_m,
         disturbances=blocks,
         disturbance_parameters=parameters,
+        perturbed=np.arange(len(uas) if any(d and d.perturbs for d in disturbances) else 0),
         events=event_records(scenario),
         sensing=sensing_records(scenario),
         packs=pack_records(scenario),

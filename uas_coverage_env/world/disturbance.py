@@ -39,7 +39,8 @@ class Disturbance:
     flies, when all inputs are known and before any UAS moves. It adds to `outcome[i].wind_mps`,
     the velocity of the air at the UAS over the step (NED), or to `outcome[i].force_N`, another
     force on it (NED), or changes `outcome[i].u`, the inputs that the inner loop asks for, which
-    are then cut off at the vehicle's limits. All else is to be read only. `parameters` is (P,)
+    are then cut off at the vehicle's limits; or it makes the vehicle of UAS i another with
+    `uas_coverage_env.disturbances.perturb`. All else is to be read only. `parameters` is (P,)
     float64; `memory` is (DISTURBANCE_MEMORY,) float64 of UAS i, zero at t = 0 and kept from step to
     step; `random` is what `uniform` and `normal` of `uas_coverage_env.disturbances` draw from.
 
@@ -50,6 +51,7 @@ class Disturbance:
         common: All UAS draw the same random numbers, instead of each its own.
         of_event: Its parameters hold the number of an event: it acts in scenarios that have it,
             and is refused in others, where the kernel would read beside its array.
+        perturbs: It makes vehicles others than is believed; the state has room for that then.
 
     Raises:
         ValueError: A parameter is not finite, or the name is empty.
@@ -60,6 +62,7 @@ class Disturbance:
     parameters: tuple[float, ...] = ()
     common: bool = False
     of_event: bool = False
+    perturbs: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.memory import Memory, Values
-from uas_coverage_env.vehicle import N_STATES, PSI
+from uas_coverage_env.vehicle import N_STATES, PSI, VEHICLE_DTYPE
 from uas_coverage_env.world.disturbance import DISTURBANCE_MEMORY
 from uas_coverage_env.world.events import (
     EVERY,
@@ -94,6 +94,8 @@ class WorldState(NamedTuple):
     """The latest command that reached each UAS."""
     packs: Annotated[NDArray[np.int64], "B", N_PACK]
     """Of each UAS what is named beside `PACK_NUMBER`; of none where none swaps on its own."""
+    true_vehicles: Annotated[NDArray[np.void], VEHICLE_DTYPE, "true vehicles"]
+    """What each UAS flies, where disturbances make that another than is believed; else none."""
     due_step: Annotated[NDArray[np.int64], "repeats", Values(0, 2**40)]
     """The sample at which each waypoint that was covered is asked for again, 0 where it is not; of
     none where no waypoint is to be covered more than once."""
@@ -141,7 +143,7 @@ def _with_x(state, x):
         state.filtered, state.uncovered, state.step, state.disturbance_memory,
         state.disturbance_random, state.event_step, state.event_uas, state.event_random,
         state.felt, state.sensed, state.told, state.delayed, state.bias, state.sensing_random,
-        state.heard, state.packs, state.due_step,
+        state.heard, state.packs, state.true_vehicles, state.due_step,
     )  # fmt: skip
 
 
