@@ -94,7 +94,8 @@ def expected_step(scenario, state, wrenches, returning, judged=()):
     start = state.x[:, :3]
     flying = [i for i, status in enumerate(state.uas["status"]) if status == FLYING]
     results = [
-        Expected(x=x.copy(), status=int(s)) for x, s in zip(state.x, state.uas["status"], strict=True)
+        Expected(x=x.copy(), status=int(s))
+        for x, s in zip(state.x, state.uas["status"], strict=True)
     ]
     for i in flying:
         _fly(scenario.vehicles[i], scenario.dt_s, wrenches[i], results[i])

@@ -3,8 +3,8 @@
 import math
 
 from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.features import Disturbance, normal, uniform
-from uas_coverage_env.vehicle import DEVIATIONS, LIFT
+from uas_coverage_env.features import Disturbance, normal, perturb, uniform
+from uas_coverage_env.vehicle import LIFT, PERTURBATIONS
 
 
 @kernel
@@ -61,18 +61,26 @@ RETURNS = Disturbance("returns", _returns)
 
 
 @kernel
-def _deviate(arena, state, outcome, i, parameters, memory, random):
-    for k in range(parameters.shape[0]):
-        outcome[i].deviation[k] += parameters[k]
+def _perturb(arena, state, outcome, i, parameters, memory, random):
+    if state.step[0] == 0:
+        perturb(arena, state, i, parameters)
 
 
-def deviating(**deviations):
+def perturbed(**perturbations):
     """A vehicle that is another than is believed; by name, 0 where not named."""
-    names = [deviation.name for deviation in DEVIATIONS]
-    assert set(deviations) <= set(names)
-    return Disturbance(
-        "deviating", _deviate, tuple(float(deviations.get(name, 0.0)) for name in names)
-    )
+    names = [perturbation.name for perturbation in PERTURBATIONS]
+    assert set(perturbations) <= set(names)
+    parameters = tuple(float(perturbations.get(name, 0.0)) for name in names)
+    return Disturbance("perturbed", _perturb, parameters, perturbs=True)
+
+
+@kernel
+def _secretly_perturb(arena, state, outcome, i, parameters, memory, random):
+    memory[0] = 0.1
+    perturb(arena, state, i, memory)
+
+
+SECRETLY_PERTURBING = Disturbance("secretly_perturbing", _secretly_perturb)
 
 
 @kernel

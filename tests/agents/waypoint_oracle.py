@@ -26,7 +26,9 @@ class Mission:
         self.unit_m, self.unit_s = legs.unit
         self.places_m = arena.waypoints["position_m"]
         self.flying = [j for j in range(len(targets)) if state.uas[j].status == FLYING]
-        self.covering = [j for j in self.flying if not state.uas[j].returning and targets[j] != HOME]
+        self.covering = [
+            j for j in self.flying if not state.uas[j].returning and targets[j] != HOME
+        ]
 
     def leg_s(self, i, way_m, rise_m, w):
         uas = self.arena.uas[i]

@@ -62,7 +62,9 @@ def test_a_hover_in_steady_wind_comes_to_rest_and_knows_the_wind(wind_mps, from_
         world.step(HOVER)
     towards = np.deg2rad(from_deg + 180.0)
     wind = wind_mps * np.array([np.cos(towards), np.sin(towards)])
-    np.testing.assert_allclose(world.state.uas["belief"][0, WIND : WIND + 2], wind, atol=0.05 * wind_mps)
+    np.testing.assert_allclose(
+        world.state.uas["belief"][0, WIND : WIND + 2], wind, atol=0.05 * wind_mps
+    )
     assert np.abs(world.state.x[0, VX : VZ + 1]).max() < 0.1
 
 

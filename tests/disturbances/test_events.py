@@ -72,7 +72,10 @@ def test_a_wrench_is_not_held_on_without_a_radio():
 def test_a_uas_without_a_radio_may_return():
     world = after(hovering(event("radio_lost", 10.0, uas="uas_1", for_s=99.0, then="return")), 10)
     assert world.state.x[0, 0] - 40.0 > 12.0
-    assert after(world, 25, Velocity(0.0, 0.0, 20.0)).state.uas["status"].tolist() == [LANDED, FLYING]
+    assert after(world, 25, Velocity(0.0, 0.0, 20.0)).state.uas["status"].tolist() == [
+        LANDED,
+        FLYING,
+    ]
 
 
 @RESPONSES

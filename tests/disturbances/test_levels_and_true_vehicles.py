@@ -39,10 +39,16 @@ def uncertain(starts=STARTS, **bounds):
     return meadow(starts).model_copy(update={"uncertainty": Uncertainty(**(bounds or BOUNDS))})
 
 
+def perturbations(world):
+    """(U, 6) by how much the vehicles that fly are others than their files say."""
+    return world.state.true_vehicles["perturbation"].copy()
+
+
 def drawn(world, mission=0):
-    """(U, 6) by how much the vehicles of a mission deviate."""
+    """`perturbations` of a mission."""
     world.reset(mission=mission)
-    return world.step(dict.fromkeys(world.active, LEVEL))["deviation"].copy()
+    world.step(dict.fromkeys(world.active, LEVEL))
+    return perturbations(world)
 
 
 def test_true_vehicles_are_drawn_within_the_bounds_for_each_uas_and_mission():
@@ -63,7 +69,8 @@ def test_true_vehicles_are_drawn_within_the_bounds_for_each_uas_and_mission():
 def test_a_seed_repeats_the_vehicles_and_they_stay_the_same_in_a_mission():
     world = World(uncertain(), seed=4)
     first = drawn(world)
-    later = world.step(dict.fromkeys(world.active, LEVEL))["deviation"]
+    world.step(dict.fromkeys(world.active, LEVEL))
+    later = perturbations(world)
     np.testing.assert_array_equal(later, first)
     np.testing.assert_array_equal(drawn(World(uncertain(), seed=4)), first)
     assert (drawn(World(uncertain(), seed=5)) != first).all()
@@ -78,7 +85,7 @@ def test_a_mission_begins_in_the_hover_of_the_true_vehicle(dynamics):
         taken.append(outcome["current_A"].copy())
     np.testing.assert_allclose(world.state.x[:, VZ], 0.0, atol=1e-9)
     np.testing.assert_allclose(world.state.x[:, Z], -25.0, atol=1e-9)
-    mass, thrust = outcome["deviation"][:, :2].T
+    mass, thrust = perturbations(world)[:, :2].T
     heaviest, lightest = np.argsort((1.0 + mass) / (1.0 + thrust))[[-1, 0]]
     assert taken[0][heaviest] > taken[0][lightest]
 

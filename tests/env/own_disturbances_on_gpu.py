@@ -3,7 +3,7 @@
 import numpy as np
 from beside_episodes import compare
 from own_actions import CLIMB_RATE
-from own_disturbances import deviating, drained, gusts, push, weak_rotors
+from own_disturbances import drained, gusts, perturbed, push, weak_rotors
 from practice_grounds import practice_ground
 
 from uas_coverage_env.features import disturbances_of
@@ -25,7 +25,7 @@ OWN = (
     gusts(),
     push(0.2, 0.0, 0.0),
     weak_rotors(0.05),
-    deviating(mass=0.05, drag=0.2, power=0.1),
+    perturbed(mass=0.05, drag=0.2, power=0.1),
     drained(0.01),
 )
 MOTOR = disturbances_of(EVENTFUL)

@@ -13,7 +13,7 @@ from uas_coverage_env import World, uas_coverage_v0
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.features import constant_wind, disturbances_of
-from uas_coverage_env.scenario import Wind, with_disturbances
+from uas_coverage_env.scenario import Uncertainty, Wind, with_disturbances
 
 GROUND = practice_ground(n_uas=2, max_steps=12)
 LEVEL = disturbances_of(with_disturbances(GROUND, "moderate", 1))
@@ -105,22 +105,24 @@ def test_every_environment_takes_disturbances():
     assert (observed != in_still_air).any()
 
 
-def test_scenarios_with_and_without_wind_share_a_batch():
-    pool = (GROUND, WINDY, practice_ground(n_uas=1, max_steps=12))
-    batch = CoverageBatch(3, pool)
-    batch.reset(0, scenarios=[0, 1, 2])
+def test_scenarios_with_and_without_disturbances_share_a_batch():
+    uncertain = GROUND.model_copy(update={"uncertainty": Uncertainty(mass=0.05, power=0.1)})
+    pool = (GROUND, WINDY, practice_ground(n_uas=1, max_steps=12), uncertain)
+    batch = CoverageBatch(4, pool)
+    batch.reset(0, scenarios=[0, 1, 2, 3])
     envs = [uas_coverage_v0.parallel_env(scenario) for scenario in pool]
-    for env in envs:
-        env.reset(seed=0)
+    for lane, env in enumerate(envs):
+        env.reset(seed=lane)
     rng = np.random.default_rng(3)
     for _ in range(10):
-        actions = rng.uniform(-1.0, 1.0, (3, 2, 3))
+        actions = rng.uniform(-1.0, 1.0, (4, 2, 3))
         observation = batch.step(actions)
         for lane, env in enumerate(envs):
             asked = dict(zip(env.agents, actions[lane], strict=False))
             seen = env.step(asked)[0]
             np.testing.assert_array_equal(observation[lane, : len(seen)], list(seen.values()))
     assert (batch.worlds.x[0] != batch.worlds.x[1]).any()
+    assert batch.worlds.true_vehicles["perturbation"].any(axis=(1, 2)).tolist() == [0, 0, 0, 1]
 
 
 def test_a_batch_that_is_put_aside_goes_on_as_if_it_had_not_been():
@@ -135,6 +137,11 @@ def test_a_batch_that_is_put_aside_goes_on_as_if_it_had_not_been():
     other = CoverageBatch(2, GROUND, disturbances=OWN)
     other.load_state_dict(kept)
     copied = pickle.loads(pickle.dumps(batch))
+    for name, value in (("mass_kg", np.nan), ("n_segments", 9)):
+        broken = {key: array.copy() for key, array in kept.items()}
+        broken["true_vehicles"][name][1, 0] = value
+        with pytest.raises(ValueError, match=rf"true_vehicles.{name}\[1, 0\] is"):
+            other.load_state_dict(broken)
     for _ in range(6):
         observation = batch.step(actions)
         np.testing.assert_array_equal(other.step(actions), observation)

@@ -23,7 +23,10 @@ def test_a_view_holds_the_state_of_the_world_through_a_mission(village):
         for name, ours, theirs in zip(world.state._fields, view.state, world.state, strict=True):
             np.testing.assert_array_equal(ours, theirs, err_msg=name)
             assert not np.shares_memory(ours, theirs)
-        departed, returning = departed + view.state.uas[0].departed, returning + view.state.uas[0].returning
+        departed, returning = (
+            departed + view.state.uas[0].departed,
+            returning + view.state.uas[0].returning,
+        )
         first_and_last = np.flatnonzero(world.state.uncovered)[[0, -1]].tolist()
         targets = dict(zip(world.names, first_and_last, strict=True))
         world.step({name: GoTo(targets[name]) for name in world.active})

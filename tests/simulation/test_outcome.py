@@ -9,7 +9,7 @@ from uas_coverage_env.simulation import advance, initial_state
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, VELOCITY, build_arena
 
 # written, and read, only where disturbances act: `disturb` resets them
-OF_DISTURBANCES = {"wind_mps", "force_N", "deviation", "rotor_power", "dod_lost"}
+OF_DISTURBANCES = {"wind_mps", "force_N", "dod_lost"}
 
 SCENARIO = generate_scenario(3, n_uas=3, n_waypoints=20, n_obstacles=10)
 

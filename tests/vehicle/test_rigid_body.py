@@ -26,7 +26,6 @@ from uas_coverage_env.vehicle import (
     plant_step,
     tilts_and_turn,
 )
-from uas_coverage_env.vehicle.deviation import N_DEVIATIONS
 from uas_coverage_env.vehicle.plant import _rigid_body
 
 numbers = st.lists(st.floats(-1.0, 1.0), min_size=15, max_size=15)
@@ -47,7 +46,7 @@ def test_the_rigid_body_obeys_newton_and_euler(name, drawn, thrust_N):
     x[:DOD] = drawn[:12] * np.repeat([100.0, 15.0, 1.2, 3.0], 3)
     torque = 2.0 * drawn[12:]
     dx = np.full(N_STATES, np.nan)
-    _rigid_body(record_of(name), np.zeros(N_DEVIATIONS), x, thrust_N, torque, dx)
+    _rigid_body(record_of(name), x, thrust_N, torque, dx)
     R, omega, inertia = rotation(x[PHI:WX]), x[WX:DOD], np.diag(body.inertia_kgm2)
     np.testing.assert_array_equal(dx[X:VX], x[VX:PHI])
     drag = np.array([body.drag_kgps, body.drag_kgps, body.drag_vertical_kgps]) * x[VX:PHI]
@@ -87,7 +86,7 @@ def test_so_does_one_whose_tilts_are_on_axes_that_do_not_turn(drawn, psi, thrust
     x[PSI] = psi
     torque = 2.0 * drawn[12:]
     dx = np.full(N_STATES, np.nan)
-    _rigid_body(record[()], np.zeros(N_DEVIATIONS), x, thrust_N, torque, dx)
+    _rigid_body(record[()], x, thrust_N, torque, dx)
     R, back = turned_after(x[PHI:WX]), Rotation.from_euler("Z", psi).as_matrix()
     drag = np.array([body.drag_kgps, body.drag_kgps, body.drag_vertical_kgps]) * x[VX:PHI]
     force = [0.0, 0.0, body.mass_kg * body.gravity_mps2] - thrust_N * R[:, 2] - drag

@@ -64,7 +64,9 @@ def test_whatever_was_flown_braking_ends_within_the_time_that_is_stated(vehicle,
         state.x[0, DOD] = 0.0
         world.step({"uas_1": command})
         brake = world.arena.rules[0].brake
-        fly_and_brake(world.arena, 0, state.x[0], state.uas[0].reference_mps[:], brake, False, path_m)
+        fly_and_brake(
+            world.arena, 0, state.x[0], state.uas[0].reference_mps[:], brake, False, path_m
+        )
         speeds_mps = np.linalg.norm(np.diff(path_m, axis=0), axis=1) / dt_s
         longest_s = max(longest_s, dt_s * (np.flatnonzero(speeds_mps > AT_REST_MPS).max() + 1))
     assert 0.5 * stated_s < longest_s <= stated_s

@@ -63,7 +63,14 @@ def test_turbulence_and_gusts_seldom_lead_a_prediction_out_of_its_tube(level):
         path_m = np.zeros((int(world.arena.rules[0].lookahead_steps) + 1, 3))
         state, brake = world.state, world.arena.rules[0].brake
         fly_and_brake(
-            world.arena, 0, state.x[0], state.uas[0].reference_mps[:], brake, False, path_m, state.uas[0].belief[:]
+            world.arena,
+            0,
+            state.x[0],
+            state.uas[0].reference_mps[:],
+            brake,
+            False,
+            path_m,
+            state.uas[0].belief[:],
         )
         predicted.append(path_m[: horizon + 1, :2])
         flown.append(world.state.x[0, :2].copy())

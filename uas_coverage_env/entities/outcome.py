@@ -3,7 +3,7 @@
 from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.entities.codes import ContactKind
 from uas_coverage_env.entities.commands import COMMAND_DTYPE
-from uas_coverage_env.vehicle import N_DEVIATIONS, N_INPUTS
+from uas_coverage_env.vehicle import N_INPUTS
 
 NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY, FAULT, LIMITS = map(int, ContactKind)
 
@@ -23,12 +23,6 @@ OUTCOME_DTYPE = record_dtype(
         # what disturbances did over the step: velocity of the air, and another force, NED
         ("wind_mps", "f8", (3,)),
         ("force_N", "f8", (3,)),
-        # by how much the vehicle that flew was another than is believed: 0 as believed;
-        # places as in `vehicle.DEVIATIONS`
-        ("deviation", "f8", (N_DEVIATIONS,)),
-        # the LPV model takes the power of this step from the rotor model, where that needs
-        # more than the fit does
-        ("rotor_power", "?"),
         # share of the capacity that the battery lost besides what the motors drew
         ("dod_lost", "f8"),
         ("voltage_V", "f8"),

@@ -10,7 +10,7 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.memory import Memory, Values, record_dtype
 from uas_coverage_env.compiled.views import replaced
 from uas_coverage_env.entities.codes import UasStatus
-from uas_coverage_env.vehicle import N_STATES, PSI
+from uas_coverage_env.vehicle import N_STATES, PSI, VEHICLE_DTYPE
 
 ABSENT, FLYING, LANDED, LOST, SWAPPING = map(int, UasStatus)
 
@@ -101,6 +101,8 @@ class WorldState(NamedTuple):
     ]
     packs: Annotated[NDArray[np.void], PACK_STATE_DTYPE, "B"]
     """Of each UAS; of none where none swaps on its own."""
+    true_vehicles: Annotated[NDArray[np.void], VEHICLE_DTYPE, "true vehicles"]
+    """What each UAS flies, where features make that another than is believed; else none."""
     due_step: Annotated[NDArray[np.int64], "repeats", Values(0, 2**40)]
     """The sample at which each waypoint that was covered is asked for again, 0 where it is not; of
     none where no waypoint is to be covered more than once."""

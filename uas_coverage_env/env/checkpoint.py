@@ -14,6 +14,7 @@ from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.scenes import scenes_in
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle.compiled import COUNTS
 
 
 def checked(
@@ -53,6 +54,7 @@ def checked(
             **LANES.limits({"S": len(scenarios)}, lanes=False),
             **STATE.limits({"samples": longest + 1}, lanes=True),
             **LEARNERS.limits({"W": n_waypoints}, lanes=True),
+            **{f"true_vehicles.{name}": most for name, most in COUNTS.items()},
         },
     )
     if isinstance(pool, DrawnPool):

@@ -66,6 +66,8 @@ class DrawnPool:
         self.sizes["memory words"] = memory_words(self.features, source.room.n_uas)
         swaps = any(swaps_alone(scenario) for scenario in source.examples)
         self.sizes["B"] = source.room.n_uas if swaps else 0
+        perturbed = any(feature.perturbs for feature in self.features)
+        self.sizes["true vehicles"] = source.room.n_uas if perturbed else 0
         repeats = any(scenario.asks_again for scenario in source.examples)
         self.sizes["repeats"] = self.sizes["W"] if repeats else 0
         self.changes = any(changes_scene(scenario) for scenario in source.examples)

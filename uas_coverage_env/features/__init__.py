@@ -9,8 +9,10 @@ from uas_coverage_env.features.dryden import turbulence
 from uas_coverage_env.features.event import EventTable, OfUas
 from uas_coverage_env.features.feature import DISTURBANCE_MEMORY, Disturbance, Feature, Point
 from uas_coverage_env.features.gusts import discrete_gusts, random_gusts
+from uas_coverage_env.features.of_scenario import disturbances_of
 from uas_coverage_env.features.parameter_errors import uncertainty
 from uas_coverage_env.features.table import DisturbanceTable, FeatureTable
+from uas_coverage_env.features.true_vehicles import perturb
 from uas_coverage_env.features.wind import constant_wind, mean_wind, wind_velocity_mps
 
 __all__ = [
@@ -24,8 +26,10 @@ __all__ = [
     "Point",
     "constant_wind",
     "discrete_gusts",
+    "disturbances_of",
     "mean_wind",
     "normal",
+    "perturb",
     "random_gusts",
     "turbulence",
     "uncertainty",

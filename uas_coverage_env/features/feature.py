@@ -78,6 +78,7 @@ class Feature:
         records: (n,) what it knows, the same in all steps.
         memory: Type of the record that it keeps for each UAS, zero at t = 0; None: it keeps none.
         key: In place of the number that follows from the name, for random numbers.
+        perturbs: It makes vehicles others than is believed; the state has room for that then.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Feature:
     records: NDArray[Any] = field(default_factory=lambda: np.zeros(0))
     memory: np.dtype | None = None
     key: int | None = None
+    perturbs: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -110,7 +112,8 @@ class Disturbance(Feature):
     flies, when all inputs are known and before any UAS moves. It adds to `outcome[i].wind_mps`,
     the velocity of the air at the UAS over the step (NED), or to `outcome[i].force_N`, another
     force on it (NED), or changes `outcome[i].u`, the inputs that the inner loop asks for, which
-    are then cut off at the vehicle's limits. All else is to be read only. `parameters` is (P,)
+    are then cut off at the vehicle's limits; or it makes the vehicle of UAS i another with
+    `uas_coverage_env.features.perturb`. All else is to be read only. `parameters` is (P,)
     float64; `memory` is (DISTURBANCE_MEMORY,) float64 of UAS i, zero at t = 0 and kept from step to
     step; `random` is what `uniform` and `normal` of `uas_coverage_env.features` draw from.
 
@@ -119,13 +122,19 @@ class Disturbance(Feature):
         act: The kernel.
         parameters: Finite numbers that it is handed.
         common: All UAS draw the same random numbers, instead of each its own.
+        perturbs: It makes vehicles others than is believed.
 
     Raises:
         ValueError: A parameter is not finite, or the name is empty.
     """
 
     def __init__(
-        self, name: str, act: Any, parameters: tuple[float, ...] = (), common: bool = False
+        self,
+        name: str,
+        act: Any,
+        parameters: tuple[float, ...] = (),
+        common: bool = False,
+        perturbs: bool = False,
     ) -> None:
         check_parameters(f"disturbance {name}", parameters)
         super().__init__(
@@ -133,6 +142,7 @@ class Disturbance(Feature):
             {Point.BEGIN: _begin_common if common else _begin_each, Point.ACT: _on_each(act)},
             np.array(parameters, dtype=np.float64),
             MEMORY_DTYPE,
+            perturbs=perturbs,
         )
         # frozen, as all features are
         self.__dict__.update(act=act, parameters=parameters, common=common)

@@ -4,11 +4,12 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from uas_coverage_env.compiled.kernels import rare_kernel
+from uas_coverage_env.compiled.kernels import rare_kernel, stack_array
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.features.event import OfUas, concerns
 from uas_coverage_env.features.feature import Feature, Point
-from uas_coverage_env.vehicle import LIFT, POWER
+from uas_coverage_env.features.true_vehicles import perturb
+from uas_coverage_env.vehicle import LIFT, N_PERTURBATIONS, POWER
 
 
 @rare_kernel
@@ -17,13 +18,18 @@ def _degrade(arena, state, outcome, f):
     for i in range(state.uas.shape[0]):
         if state.uas[i].status != FLYING:
             continue
-        event, vehicle = outcome[i], arena.vehicles[i]
+        vehicle, u = arena.vehicles[i], outcome[i].u
         for e in range(arena.events.shape[0]):
             if concerns(arena, state, e, f, i) and state.step[0] >= state.events[e].step:
                 values = arena.events[e].values
+                if state.step[0] == state.events[e].step:
+                    change = stack_array(N_PERTURBATIONS)
+                    for k in range(N_PERTURBATIONS):
+                        change[k] = 0.0
+                    change[POWER] = values[1] - 1.0
+                    perturb(arena, state, i, change)
                 thrust_N = values[0] * (vehicle.weight_N + vehicle.lift_max_N)
-                event.u[LIFT] = min(event.u[LIFT], thrust_N - vehicle.weight_N)
-                event.deviation[POWER] += values[1] - 1.0
+                u[LIFT] = min(u[LIFT], thrust_N - vehicle.weight_N)
 
 
 class MotorDegraded(OfUas):
@@ -36,7 +42,7 @@ class MotorDegraded(OfUas):
         power_factor: How many times as much power it draws for the same thrust [-].
     """
 
-    feature: ClassVar = Feature("motor_degraded", {Point.ACT: _degrade})
+    feature: ClassVar = Feature("motor_degraded", {Point.ACT: _degrade}, perturbs=True)
 
     kind: Literal["motor_degraded"]
     thrust_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0

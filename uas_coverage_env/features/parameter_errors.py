@@ -3,13 +3,18 @@
 from collections.abc import Iterable
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field
 
-from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.compiled.random import uniform
-from uas_coverage_env.features.feature import Disturbance, Feature
+from uas_coverage_env.compiled.kernels import rare_kernel
+from uas_coverage_env.compiled.memory import record_dtype
+from uas_coverage_env.compiled.random import counted, uniform
+from uas_coverage_env.compiled.views import record_view
+from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.features.feature import Feature, Point
 from uas_coverage_env.features.table import FeatureTable
-from uas_coverage_env.vehicle import CAPACITY, LIFT, MASS, N_DEVIATIONS, THRUST
+from uas_coverage_env.features.true_vehicles import perturb
+from uas_coverage_env.vehicle import CAPACITY, LIFT, MASS, N_PERTURBATIONS, THRUST
 
 Share = Annotated[float, Field(ge=0.0, le=0.5)]
 
@@ -40,33 +45,52 @@ class Uncertainty(FeatureTable):
         return () if self == Uncertainty() else (uncertainty(self),)
 
 
-_DRAWN = N_DEVIATIONS  # place in the memory
+MEMORY_DTYPE = record_dtype(
+    [
+        # what is drawn of each perturbation
+        ("shares", "f8", (N_PERTURBATIONS,)),
+        # lift of the true hover beyond that of the believed one, over its weight
+        ("more_lift", "f8"),
+        ("random", "u8", (1,)),
+    ]
+)
+
+_bounds_of = record_view(np.dtype(np.float64))
+_memory_of = record_view(MEMORY_DTYPE)
 
 
-@kernel
-def deviate(arena, state, outcome, i, parameters, memory, random):
-    """Fly a vehicle drawn at the beginning; parameters: the bounds, in the order of `DEVIATIONS`.
-
-    Those of the battery go one way: it ages. A mission begins in a hover, so the thrust of the
-    true hover is known, as autopilots learn it in flight: the lift asked for is counted from there.
-    """
-    if memory[_DRAWN] == 0.0:
-        for k in range(N_DEVIATIONS):
+@rare_kernel
+def _draw(arena, state, f, seed):
+    """Draw the vehicles that fly; parameters of the battery go one way: it ages."""
+    own = arena.features[f]
+    bounds = _bounds_of(arena.feature_words, own.first, own.n)
+    memory = _memory_of(state.memory, own.memory, state.uas.shape[0])
+    for i in range(state.uas.shape[0]):
+        drawn = memory[i]
+        random, shares = drawn.random[:], drawn.shares[:]
+        random[0] = counted(seed, i + 1)
+        for k in range(N_PERTURBATIONS):
             share = uniform(random)
-            memory[k] = parameters[k] * (share if k >= CAPACITY else 2.0 * share - 1.0)
-        memory[CAPACITY] = -memory[CAPACITY]
-        memory[_DRAWN] = 1.0
-    event = outcome[i]
-    for k in range(N_DEVIATIONS):
-        event.deviation[k] += memory[k]
-    to_hover = (1.0 + memory[MASS]) / (1.0 + memory[THRUST])
-    event.u[LIFT] += (to_hover - 1.0) * arena.vehicles[i].weight_N
+            shares[k] = bounds[k] * (share if k >= CAPACITY else 2.0 * share - 1.0)
+        shares[CAPACITY] = -shares[CAPACITY]
+        drawn.more_lift = (1.0 + shares[MASS]) / (1.0 + shares[THRUST]) - 1.0
+        perturb(arena, state, i, shares)
 
 
-def uncertainty(bounds: Uncertainty) -> Disturbance:
+@rare_kernel
+def _hover(arena, state, outcome, f):
+    """Count the lift from the true hover: a mission begins in it, so autopilots have learnt it."""
+    memory = _memory_of(state.memory, arena.features[f].memory, state.uas.shape[0])
+    for i in range(state.uas.shape[0]):
+        if state.uas[i].status == FLYING:
+            outcome[i].u[LIFT] += memory[i].more_lift * arena.vehicles[i].weight_N
+
+
+def uncertainty(bounds: Uncertainty) -> Feature:
     """The true vehicles of a scenario."""
-    parameters = (
+    each = (
         *(bounds.mass, bounds.thrust, bounds.drag, bounds.power),
         *(bounds.capacity_lost, bounds.resistance_gained),
     )
-    return Disturbance("uncertainty", deviate, parameters)
+    kernels = {Point.BEGIN: _draw, Point.ACT: _hover}
+    return Feature("uncertainty", kernels, np.array(each), MEMORY_DTYPE, perturbs=True)

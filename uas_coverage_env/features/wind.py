@@ -19,6 +19,7 @@ from pydantic import (
 from uas_coverage_env.compiled.kernels import inlined_kernel, interpreted, kernel
 from uas_coverage_env.features.feature import Disturbance, Feature
 from uas_coverage_env.features.table import FeatureTable
+from uas_coverage_env.features.true_vehicles import true_vehicle
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.vehicle import Z
 
@@ -164,7 +165,8 @@ def _blow_by_profile(state, outcome, i, parameters):
     for axis in range(2):
         event.wind_mps[axis] += share * parameters[axis]
     event.wind_mps[2] += parameters[2]
-    event.rotor_power = parameters[_ROTOR_POWER] != 0.0
+    if parameters[_ROTOR_POWER] != 0.0:
+        true_vehicle(state, i).rotor_power = True
 
 
 @kernel
@@ -208,8 +210,9 @@ def mean_wind(wind: Wind) -> Disturbance:
     plain = constant_wind(wind.mean_mps, wind.from_deg, wind.up_mps)
     if law == CONSTANT and wind.power == "fitted":
         return plain
-    more = (float(law), value, wind.reference_height_m, float(wind.power == "rotor"))
-    return Disturbance("wind", blow, (*plain.parameters, *more))
+    rotor_power = wind.power == "rotor"
+    more = (float(law), value, wind.reference_height_m, float(rotor_power))
+    return Disturbance("wind", blow, (*plain.parameters, *more), perturbs=rotor_power)
 
 
 def mean_wind_mps(wind: Wind, height_m: float) -> float:

@@ -30,14 +30,9 @@ from uas_coverage_env.simulation.points import (
 from uas_coverage_env.vehicle import (
     DOD,
     LIFT,
-    N_DEVIATIONS,
     TAU_Z,
     U_TH,
-    add_force,
     clip_wrench,
-    deviates,
-    deviating_lpv_step,
-    deviating_plant_step,
     enter_air,
     face_course,
     leave_air,
@@ -89,34 +84,28 @@ def write_all_inputs(arena, state, nonlinear, outcome):
 
 
 @inlined_kernel
-def _move_deviating(vehicle, event, nonlinear, x, u):
-    """Fly one step of a vehicle that is another than it is believed to be."""
-    if nonlinear:
-        return deviating_plant_step(vehicle, event.deviation, x, u, x)
-    return deviating_lpv_step(vehicle, event.deviation, event.rotor_power, x, u, x)
+def _flown_vehicle(arena, state, i):
+    """The vehicle that flies: the true one, where that may be another than is believed."""
+    if state.true_vehicles.shape[0] > 0:
+        return state.true_vehicles[i]
+    return arena.vehicles[i]
 
 
 @inlined_kernel
-def _be_pushed(vehicle, belief, event, step, dod_before, x):
+def _be_pushed(vehicle, flown, belief, event, step, dod_before, x):
     """What wind, forces and faults add to a step that was flown in the air, and what is learnt."""
     leave_air(vehicle, x, event.wind_mps)
-    if deviates(event.deviation):
-        add_force(vehicle, event.deviation, x, event.force_N)
-    else:
-        push(vehicle, x, event.force_N)
+    push(flown, x, event.force_N)
     x[DOD] += event.dod_lost
     learn(vehicle, belief, step, dod_before, x)
 
 
 @inlined_kernel
 def clear(event):
-    """Begin with still air, no force, and the vehicle that is believed."""
+    """Begin with still air and no force."""
     for axis in range(3):
         event.wind_mps[axis] = 0.0
         event.force_N[axis] = 0.0
-    for k in range(N_DEVIATIONS):
-        event.deviation[k] = 0.0
-    event.rotor_power = False
     event.dod_lost = 0.0
 
 
@@ -131,13 +120,6 @@ def check_all(arena, state, outcome):
 @inlined_kernel
 def _check_and_clip(arena, i, event):
     total = event.dod_lost
-    for k in range(N_DEVIATIONS):
-        total += abs(event.deviation[k])
-        if event.deviation[k] <= -1.0:
-            raise ValueError(
-                "disturbances leave a UAS without mass, thrust, drag, power or battery: a "
-                "deviation is -1 or less; correct their kernels"
-            )
     for axis in range(3):
         total += abs(event.wind_mps[axis]) + abs(event.force_N[axis])
     for k in range(LIFT, TAU_Z + 1):
@@ -224,18 +206,17 @@ def move_all(arena, state, nonlinear, outcome):
             _write_inputs(arena, estimated, i, outcome)
         x = state.x[i]
         u = event.u[:]
-        vehicle = arena.vehicles[i]
+        vehicle, flown = arena.vehicles[i], _flown_vehicle(arena, state, i)
         dod_before = x[DOD]
         if disturbed:
             enter_air(x, event.wind_mps)
-        if disturbed and (event.rotor_power or deviates(event.deviation)):
-            voltage_V, current_A = _move_deviating(vehicle, event, nonlinear, x, u)
-        elif nonlinear:
-            voltage_V, current_A = plant_step(vehicle, x, u, x)
+        if nonlinear:
+            voltage_V, current_A = plant_step(flown, x, u, x)
         else:
-            voltage_V, current_A = lpv_step(vehicle, x, u, x)
+            voltage_V, current_A = lpv_step(flown, x, u, x)
         if disturbed:
-            _be_pushed(vehicle, state.uas[i].belief[:], event, state.step[0], dod_before, x)
+            belief = state.uas[i].belief[:]
+            _be_pushed(vehicle, flown, belief, event, state.step[0], dod_before, x)
         _note(arena, state, i, event, voltage_V, current_A)
 
 

@@ -68,7 +68,7 @@ def pool_worlds(
             features=features,
             judges_wrenches=judges_wrenches,
         )
-        start = initial_state(scenario, features)
+        start = initial_state(scenario, arena, features)
         begin_mission(arena, start, np.zeros(len(scenario.uas), dtype=OUTCOME_DTYPE))
         arenas.append(arena)
         starts.append(start)

@@ -53,12 +53,21 @@ Dynamics = Literal["lpv", "nonlinear"]
 _OUTCOMES_IN_BLOCK = 256
 
 
-def initial_state(scenario: Scenario, features: Sequence[Feature | None] = ()) -> WorldState:
-    """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off."""
+def initial_state(
+    scenario: Scenario, arena: Arena | None = None, features: Sequence[Feature | None] = ()
+) -> WorldState:
+    """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off.
+
+    Args:
+        scenario: The scenario.
+        arena: The same as arrays; None: for what has no features.
+        features: Those in the arena.
+    """
     n_uas = len(scenario.uas)
     sizes = {"U": n_uas, "W": len(scenario.waypoints), "E": len(scenario.events)}
     sizes |= {"S": n_uas if senses(scenario) else 0, "B": n_uas if swaps_alone(scenario) else 0}
     sizes["memory words"] = memory_words(features, n_uas)
+    sizes["true vehicles"] = 0 if arena is None else len(arena.perturbed)
     sizes["repeats"] = len(scenario.waypoints) if scenario.asks_again else 0
     state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
@@ -69,6 +78,8 @@ def initial_state(scenario: Scenario, features: Sequence[Feature | None] = ()) -
             x[DOD], x[U_TH] = flown.dod, flown.u_th_V
     state.uas["status"][:] = FLYING
     state.uncovered[:] = True
+    if arena is not None:
+        state.true_vehicles[:] = arena.vehicles[arena.perturbed]
     if len(state.measured):
         # where and how they start is known
         state.estimated[:] = state.measured[:] = state.observed[:] = state.x
@@ -160,7 +171,7 @@ class World:
         self._measured_m, self._judges_wrenches = measured_m, bool(judges_wrenches)
         self.known, self.revisions = scenario, 0
         self.arena = self._first_arena = self._arena_of(scenario)
-        self._start = initial_state(scenario, self.features)
+        self._start = initial_state(scenario, self.arena, self.features)
         begin_mission(self.arena, self._start, np.zeros(len(self.names), dtype=OUTCOME_DTYPE))
         self._state = self._start.copy()
         self._changes = changes_scene(scenario)

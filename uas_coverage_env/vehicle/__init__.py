@@ -10,20 +10,6 @@ from uas_coverage_env.vehicle.battery import (
 )
 from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE, compile_vehicle
 from uas_coverage_env.vehicle.data_sheet import DataSheet
-from uas_coverage_env.vehicle.deviation import (
-    CAPACITY,
-    DEVIATIONS,
-    DRAG,
-    MASS,
-    N_DEVIATIONS,
-    POWER,
-    RESISTANCE,
-    THRUST,
-    Deviation,
-    add_force,
-    deviates,
-    deviating_lpv_step,
-)
 from uas_coverage_env.vehicle.endurance import Endurance, endurance, flight_time_s
 from uas_coverage_env.vehicle.inner_loop import (
     COURSE_SPEED_MPS,
@@ -81,16 +67,27 @@ from uas_coverage_env.vehicle.params import (
     return_threshold,
     vehicle_names,
 )
-from uas_coverage_env.vehicle.plant import deviating_plant_step, plant_step
+from uas_coverage_env.vehicle.plant import plant_step
 from uas_coverage_env.vehicle.range import dod_per_s, margin_to_land, seconds_to_land
 from uas_coverage_env.vehicle.sizing import MadeVehicle, make_vehicle
 from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_thrust_correction
+from uas_coverage_env.vehicle.true_vehicle import (
+    CAPACITY,
+    DRAG,
+    MASS,
+    N_PERTURBATIONS,
+    PERTURBATIONS,
+    POWER,
+    RESISTANCE,
+    THRUST,
+    Perturbation,
+    write_true_vehicle,
+)
 
 __all__ = [
     "CAPACITY",
     "COURSE_SPEED_MPS",
     "DELTA_THRUST",
-    "DEVIATIONS",
     "DOD",
     "DRAG",
     "LIFT",
@@ -98,10 +95,11 @@ __all__ = [
     "LIMIT_NAMES",
     "LOST_BEYOND",
     "MASS",
-    "N_DEVIATIONS",
     "N_INPUTS",
     "N_LIMITS",
+    "N_PERTURBATIONS",
     "N_STATES",
+    "PERTURBATIONS",
     "PHI",
     "POWER",
     "PSI",
@@ -120,25 +118,21 @@ __all__ = [
     "WY",
     "WZ",
     "DataSheet",
-    "Deviation",
     "Endurance",
     "LinearModel",
     "MadeVehicle",
+    "Perturbation",
     "VehicleParams",
     "X",
     "Y",
     "Z",
     "acceleration_wrench",
-    "add_force",
     "battery_current_A",
     "battery_segments",
     "body_attitude",
     "clip_wrench",
     "compile_vehicle",
     "delta_thrust",
-    "deviates",
-    "deviating_lpv_step",
-    "deviating_plant_step",
     "dod_per_s",
     "endurance",
     "enter_air",
@@ -170,4 +164,5 @@ __all__ = [
     "velocity_wrench",
     "within_half_turn",
     "write_limited",
+    "write_true_vehicle",
 ]

@@ -16,6 +16,7 @@ from uas_coverage_env.vehicle.layout import LIFT, VX, VZ, X, Z
 from uas_coverage_env.vehicle.limits import N_LIMITS, bounds_of
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
+from uas_coverage_env.vehicle.true_vehicle import N_PERTURBATIONS
 
 MAX_SEGMENTS = 8
 MAX_GOVERNOR_ROWS = 128
@@ -29,6 +30,13 @@ OF_THRUST, OF_ROLL, OF_PITCH, OF_YAW = range(4)
 N_MIXED = OF_YAW + 1
 PHYSICAL_SIDES = 8
 """H_P, the sides of the polygons that stand for norms in the thrust correction."""
+
+COUNTS = {
+    "n_segments": (0, MAX_SEGMENTS),
+    "n_governor_rows": (0, MAX_GOVERNOR_ROWS),
+    "n_motors": (0, MAX_MOTORS),
+}
+"""How many rows of a record are in use, and how few and many these may be."""
 
 _DT_MIN_S = 0.1  # so that MAX_GOVERNOR_ROWS suffice
 
@@ -47,7 +55,14 @@ VEHICLE_DTYPE = record_dtype(
         ("yaw_B", _f8, (2,)),
         ("inertia_kgm2", _f8, (3,)),
         ("mass_kg", _f8),
+        # what lift is counted from: the nominal weight, see `true_vehicle`
         ("weight_N", _f8),
+        # thrust and power over those of the nominal vehicle at the same speed of the motors, and
+        # lift beyond the own weight where none is asked for; by how much each parameter is another
+        ("thrust_factor", _f8),
+        ("power_factor", _f8),
+        ("lift_surplus_N", _f8),
+        ("perturbation", _f8, (N_PERTURBATIONS,)),
         # battery: a row per segment of the discharge curve
         ("n_segments", _i8),
         ("dod_end", _f8, (MAX_SEGMENTS,)),
@@ -69,6 +84,10 @@ VEHICLE_DTYPE = record_dtype(
         ("descent_N_per_mps", _f8),
         ("tilt_N_per_rad", _f8),
         ("trim_rad_per_mps", _f8),
+        ("fitted_trim_rad_per_mps", _f8),
+        # the LPV model takes the power of level flight from the rotor model, where that needs more
+        # than the fit does
+        ("rotor_power", "?"),
         # limits
         ("v_xy_max_mps", _f8),
         ("v_up_max_mps", _f8),
@@ -161,6 +180,8 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     for name, value in vehicle.thrust_correction:
         record[name] = value
     record["trim_rad_per_mps"] = vehicle.trim_tilt_rad_per_mps
+    record["fitted_trim_rad_per_mps"] = vehicle.trim_tilt_rad_per_mps
+    record["thrust_factor"] = record["power_factor"] = 1.0
     for name in (
         "v_xy_max_mps",
         "v_up_max_mps",

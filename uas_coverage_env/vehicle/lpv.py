@@ -1,6 +1,8 @@
 """One step of the LPV model, compiled: rigid body, thrust correction, battery."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+import math
+
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, rarely
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
@@ -27,6 +29,7 @@ from uas_coverage_env.vehicle.layout import (
     Y,
     Z,
 )
+from uas_coverage_env.vehicle.thrust_correction import static_thrust_in_flow
 
 
 @inlined_kernel
@@ -36,14 +39,7 @@ def delta_thrust(vehicle, x, lift_N):
     dT = L + climb or descent + k_v |v_xy| + k_q |tilt beyond trim|, the norms as H_P-sided
     polygons; never below the vehicle's lower bound.
     """
-    total = static_thrust_deviation(vehicle, x, lift_N, vehicle.trim_rad_per_mps)
-    return max(total, vehicle.delta_thrust_min_N)
-
-
-@inlined_kernel
-def static_thrust_deviation(vehicle, x, lift_N, trim_rad_per_mps):
-    """`delta_thrust` without its lower bound, of a vehicle in trim at this tilt per speed."""
-    k = trim_rad_per_mps
+    k = vehicle.trim_rad_per_mps
     roll, pitch = x[PHI] - k * x[VY], x[THETA] + k * x[VX]
     speed, tilt = 0.0, 0.0
     for h in range(vehicle.faces.shape[0]):
@@ -52,7 +48,31 @@ def static_thrust_deviation(vehicle, x, lift_N, trim_rad_per_mps):
         tilt = max(tilt, a * roll + b * pitch)
     up = -x[VZ]
     vertical = max(vehicle.climb_N_per_mps * up, vehicle.descent_N_per_mps * up)
-    return lift_N + vertical + vehicle.speed_N_per_mps * speed + vehicle.tilt_N_per_rad * tilt
+    total = lift_N + vertical + vehicle.speed_N_per_mps * speed + vehicle.tilt_N_per_rad * tilt
+    if rarely(vehicle.rotor_power or k != vehicle.fitted_trim_rad_per_mps):
+        total += _beyond_fit_N(vehicle, x)
+    return max(total, vehicle.delta_thrust_min_N)
+
+
+@rare_kernel
+def _beyond_fit_N(vehicle, x):
+    """What level flight takes beyond the fit, which is of the nominal vehicle [N].
+
+    More drag needs more tilt at a speed, and more thrust to carry the weight at this tilt. The fit
+    is linear in the speed and holds up to the vehicle's limit, which an airspeed may exceed: the
+    rotor model knows what that takes.
+    """
+    weight_N, trim = vehicle.weight_N, vehicle.trim_rad_per_mps
+    fitted = vehicle.fitted_trim_rad_per_mps
+    square = x[VX] * x[VX] + x[VY] * x[VY]
+    leaning = math.sqrt(1.0 + trim * trim * square)
+    more_N = weight_N * (leaning - math.sqrt(1.0 + fitted * fitted * square))
+    if vehicle.rotor_power:
+        speed = math.sqrt(square)
+        across = speed / leaning
+        level_N = static_thrust_in_flow(vehicle, weight_N * leaning, across, across * trim * speed)
+        more_N = max(more_N, level_N - weight_N - vehicle.speed_N_per_mps * speed)
+    return more_N
 
 
 @inlined_kernel
@@ -113,8 +133,9 @@ def fly_kinematics(vehicle, x, u):
     _axis_step(vehicle, x, Y, VY, PHI, WX, 1.0, u[TAU_X] / inertia[0])
     A, B = vehicle.vertical_A, vehicle.vertical_B
     z, vz = x[Z], x[VZ]
-    x[Z] = A[POSITION, POSITION] * z + A[POSITION, SPEED] * vz + B[POSITION] * u[LIFT]
-    x[VZ] = A[SPEED, SPEED] * vz + B[SPEED] * u[LIFT]
+    lift = vehicle.thrust_factor * u[LIFT] + vehicle.lift_surplus_N
+    x[Z] = A[POSITION, POSITION] * z + A[POSITION, SPEED] * vz + B[POSITION] * lift
+    x[VZ] = A[SPEED, SPEED] * vz + B[SPEED] * lift
     alpha = u[TAU_Z] / inertia[2]
     x[PSI] += vehicle.dt_s * x[WZ] + vehicle.yaw_B[POSITION] * alpha
     x[WZ] += vehicle.yaw_B[SPEED] * alpha

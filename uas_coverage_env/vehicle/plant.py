@@ -18,15 +18,6 @@ import math
 
 from uas_coverage_env.compiled.kernels import kernel, rarely, stack_array
 from uas_coverage_env.vehicle.compiled import MAX_MOTORS, OF_PITCH, OF_ROLL, OF_THRUST, OF_YAW
-from uas_coverage_env.vehicle.deviation import (
-    CAPACITY,
-    DRAG,
-    MASS,
-    N_DEVIATIONS,
-    POWER,
-    RESISTANCE,
-    THRUST,
-)
 from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
@@ -129,7 +120,7 @@ def _turn_rate(x):
 
 
 @kernel
-def _rigid_body(vehicle, deviation, x, thrust_N, torque, dx):
+def _rigid_body(vehicle, x, thrust_N, torque, dx):
     """The twelve derivatives of the rigid body with thrust and torque held."""
     sp = math.sin(x[PHI])
     cp = math.cos(x[PHI])
@@ -139,16 +130,15 @@ def _rigid_body(vehicle, deviation, x, thrust_N, torque, dx):
     psi = 0.0 if turns else x[PSI]
     ss = math.sin(psi)
     cs = math.cos(psi)
-    mass = vehicle.mass_kg * (1.0 + deviation[MASS])
-    more_drag = 1.0 + deviation[DRAG]
+    mass = vehicle.mass_kg
     push = thrust_N / mass
-    drag = vehicle.drag_kgps * more_drag / mass
+    drag = vehicle.drag_kgps / mass
     for axis in range(3):
         dx[X + axis] = x[VX + axis]
     dx[VX] = -push * (cp * st * cs + sp * ss) - drag * x[VX]
     dx[VY] = -push * (cp * st * ss - sp * cs) - drag * x[VY]
     dx[VZ] = vehicle.gravity_mps2 - push * cp * ct
-    dx[VZ] -= vehicle.drag_vertical_kgps * more_drag / mass * x[VZ]
+    dx[VZ] -= vehicle.drag_vertical_kgps / mass * x[VZ]
     _attitude_rates(vehicle, x, dx[PHI:WX])
     p = x[WX]
     q = x[WY]
@@ -270,13 +260,13 @@ def _turning_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
 
 
 @kernel
-def _integrate(vehicle, deviation, x, h, thrust_N, torque, k, total, middle):
+def _integrate(vehicle, x, h, thrust_N, torque, k, total, middle):
     """One Runge-Kutta step of the rigid body in place; k, total, middle (12,) are room."""
     for s in range(_RIGID):
         total[s] = 0.0
         middle[s] = x[s]
     for stage in range(4):
-        _rigid_body(vehicle, deviation, middle, thrust_N, torque, k)
+        _rigid_body(vehicle, middle, thrust_N, torque, k)
         weight = 2.0 if stage == 1 or stage == 2 else 1.0
         ahead = h if stage == 2 else 0.5 * h
         for s in range(_RIGID):
@@ -294,21 +284,8 @@ def _integrate(vehicle, deviation, x, h, thrust_N, torque, k, total, middle):
 def plant_step(vehicle, x, u, x_next):
     """One step of the nonlinear plant under a held wrench.
 
-    Arguments and what is returned as for `deviating_plant_step`.
-    """
-    none = stack_array(N_DEVIATIONS)
-    for k in range(N_DEVIATIONS):
-        none[k] = 0.0
-    return deviating_plant_step(vehicle, none, x, u, x_next)
-
-
-@kernel
-def deviating_plant_step(vehicle, deviation, x, u, x_next):
-    """`plant_step` of a vehicle that is another than it is believed to be.
-
     Args:
-        vehicle: record of VEHICLE_DTYPE, the believed one.
-        deviation: (N_DEVIATIONS,), see `vehicle.deviation`.
+        vehicle: record of VEHICLE_DTYPE.
         x: (14,) state.
         u: (5,) lift and torques held over the step; u[DELTA_THRUST] is written, its mean.
         x_next: (14,) written; may be x itself.
@@ -320,11 +297,6 @@ def deviating_plant_step(vehicle, deviation, x, u, x_next):
     steps = max(math.ceil(vehicle.dt_s / _SUBSTEP_S - 1e-9), 1)
     h = vehicle.dt_s / steps
     left = math.exp(-h / vehicle.time_constant_th_s)
-    more_thrust = 1.0 + deviation[THRUST]
-    more_power = 1.0 + deviation[POWER]
-    capacity_As = vehicle.capacity_As * (1.0 + deviation[CAPACITY])
-    resistance_0 = vehicle.resistance_0_ohm * (1.0 + deviation[RESISTANCE])
-    resistance_th = vehicle.resistance_th_ohm * (1.0 + deviation[RESISTANCE])
     first = stack_array(6)
     torque = stack_array(3)
     roll = stack_array(3)
@@ -371,20 +343,17 @@ def deviating_plant_step(vehicle, deviation, x, u, x_next):
             x_next[VY],
             x_next[VZ],
         )
-        power = more_power * electrical_power_W(vehicle, static)
-        voltage, current = battery_operating_point(
-            vehicle, resistance_0, x_next[DOD], x_next[U_TH], power
-        )
-        x_next[DOD] += current * h / capacity_As
-        x_next[U_TH] = left * x_next[U_TH] + (1.0 - left) * resistance_th * current
+        power = vehicle.power_factor * electrical_power_W(vehicle, static)
+        voltage, current = battery_operating_point(vehicle, x_next[DOD], x_next[U_TH], power)
+        x_next[DOD] += current * h / vehicle.capacity_As
+        x_next[U_TH] = left * x_next[U_TH] + (1.0 - left) * vehicle.resistance_th_ohm * current
         correction += static - vehicle.weight_N
         charge += current * h
         energy += voltage * current * h
         for axis in range(3):
-            torque[axis] *= more_thrust
-        _integrate(
-            vehicle, deviation, x_next, h, more_thrust * thrust, torque, slope, total, middle
-        )
+            torque[axis] *= vehicle.thrust_factor
+        thrust *= vehicle.thrust_factor
+        _integrate(vehicle, x_next, h, thrust, torque, slope, total, middle)
     if rarely(turns):
         x_next[WZ] = _turn_rate(x_next)
     u[DELTA_THRUST] = correction / steps

@@ -26,12 +26,12 @@ def electrical_power_W(vehicle, thrust_N):
 
 
 @kernel
-def battery_operating_point(vehicle, resistance_0_ohm, dod, u_th_V, power_W):
-    """Voltage and current at which the Thevenin battery, with this R_0, delivers a power.
+def battery_operating_point(vehicle, dod, u_th_V, power_W):
+    """Voltage and current at which the Thevenin battery delivers a power.
 
     u_b i = P with u_b = OCV - u_th - R_0 i; where the battery has less power than is asked for, the
     product of the two is what it has.
     """
     E = open_circuit_V(vehicle, dod) - u_th_V
-    current = _current(E, resistance_0_ohm, power_W)
-    return E - resistance_0_ohm * current, current
+    current = _current(E, vehicle.resistance_0_ohm, power_W)
+    return E - vehicle.resistance_0_ohm * current, current

@@ -147,6 +147,8 @@ class Arena(NamedTuple):
     """As many in all missions of a pool."""
     feature_words: Annotated[NDArray[np.uint64], "feature words"]
     """Their records."""
+    perturbed: Annotated[NDArray[np.int64], "true vehicles"]
+    """The UAS whose vehicles features may make others than is believed: all, or none."""
     events: Annotated[NDArray[np.void], EVENT_DTYPE, "E"]
     sensing: Annotated[NDArray[np.void], SENSING_DTYPE, "S"]
     """One for each UAS, or none where they are known as they are."""
@@ -227,6 +229,7 @@ def build_arena(
         node_distance_m=corners.distance_m,
         features=feature_rows,
         feature_words=feature_words,
+        perturbed=np.arange(len(uas) if any(f and f.perturbs for f in features) else 0),
         events=event_records(scenario, features),
         sensing=sensing_records(scenario),
         packs=pack_records(scenario),

@@ -2,13 +2,24 @@
 
 import numpy as np
 import pytest
-from own_disturbances import deviating, drained, push
+from own_disturbances import SECRETLY_PERTURBING, drained, perturbed, push
 from small_worlds import meadow
 
 from uas_coverage_env import World
-from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario import Scenario, Uncertainty
 from uas_coverage_env.scenario.toml_text import toml_text
-from uas_coverage_env.vehicle import DELTA_THRUST, DEVIATIONS, DOD, LIFT, U_TH, VX, VZ, X, Z
+from uas_coverage_env.vehicle import (
+    DELTA_THRUST,
+    DOD,
+    LIFT,
+    PERTURBATIONS,
+    U_TH,
+    VEHICLE_DTYPE,
+    VX,
+    VZ,
+    X,
+    Z,
+)
 from uas_coverage_env.world import Velocity, Wrench
 
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
@@ -71,7 +82,7 @@ def asked(flight, weight_N, mass=1.0, thrust=1.0):
 @pytest.mark.parametrize("name", ["mass", "drag"])
 def test_mass_and_drag_move_a_uas_as_its_own_file_would(true_file, dynamics, name):
     draggy = true_file(set_to={"airframe": {"drag_vertical_kgps": 0.3}})
-    acting = (deviating(**{name: 0.2}), push(*OUTSIDE))
+    acting = (perturbed(**{name: 0.2}), push(*OUTSIDE))
     believed = World(draggy, dynamics=dynamics, disturbances=acting)
     factors = (
         {"airframe__mass_kg": 1.2}
@@ -108,9 +119,9 @@ def test_the_battery_is_that_of_its_own_file(true_file, dynamics):
             },
         ),
     }
-    for name, (deviation, factors) in cases.items():
+    for name, (share, factors) in cases.items():
         believed = World(
-            meadow(HIGH), dynamics=dynamics, disturbances=(deviating(**{name: deviation}),)
+            meadow(HIGH), dynamics=dynamics, disturbances=(perturbed(**{name: share}),)
         )
         x, outcomes = flown(believed)
         expected, others = flown(World(true_file(**factors), dynamics=dynamics))
@@ -123,12 +134,12 @@ def test_the_battery_is_that_of_its_own_file(true_file, dynamics):
 
 @BOTH
 @pytest.mark.parametrize(
-    ("name", "deviation"),
+    ("name", "share"),
     [("mass", 0.1), ("thrust", -0.1), ("drag", 0.5), ("power", 0.1), ("resistance", 0.5)],
 )
-def test_what_is_worse_than_believed_takes_more_of_the_battery(dynamics, name, deviation):
+def test_what_is_worse_than_believed_takes_more_of_the_battery(dynamics, name, share):
     taken = []
-    for disturbances in ((), (deviating(**{name: deviation}),)):
+    for disturbances in ((), (perturbed(**{name: share}),)):
         world = World(meadow(HIGH), dynamics=dynamics, disturbances=disturbances)
         before = world.state.x[0, DOD]
         for _ in range(15):
@@ -139,30 +150,31 @@ def test_what_is_worse_than_believed_takes_more_of_the_battery(dynamics, name, d
 
 @BOTH
 def test_weak_motors_carry_less(dynamics):
-    weak = World(meadow(HIGH), dynamics=dynamics, disturbances=(deviating(thrust=-0.1),))
+    weak = World(meadow(HIGH), dynamics=dynamics, disturbances=(perturbed(thrust=-0.1),))
     outcome = weak.step({"uas_1": Wrench(0.0, 0.0, 0.0, 0.0)})
     assert weak.state.x[0, VZ] == pytest.approx(0.1 * 9.81)
     assert weak.state.x[0, Z] == pytest.approx(-25.0 + 0.05 * 9.81)
     assert weak.state.x[0, X] == 100.0
     assert outcome[0]["u"][LIFT] == 0.0
-    np.testing.assert_allclose(outcome[0]["deviation"], [0.0, -0.1, 0.0, 0.0, 0.0, 0.0])
+    true = weak.state.true_vehicles[0]
+    np.testing.assert_array_equal(true["perturbation"], [0.0, -0.1, 0.0, 0.0, 0.0, 0.0])
 
 
 @BOTH
 def test_with_the_vehicle_that_is_believed_nothing_changes(dynamics):
     ends = [
         flown(World(meadow(HIGH), dynamics=dynamics, disturbances=acting))[0]
-        for acting in ((), (deviating(),))
+        for acting in ((), (perturbed(),))
     ]
     np.testing.assert_array_equal(*ends)
 
 
-def test_a_small_deviation_changes_little():
+def test_a_small_perturbation_changes_little():
     ends = {}
     for dynamics in ("lpv", "nonlinear"):
         for size in (0.0, 1e-9):
-            every = dict.fromkeys((d.name for d in DEVIATIONS), size)
-            world = World(meadow(HIGH), dynamics=dynamics, disturbances=(deviating(**every),))
+            every = dict.fromkeys((p.name for p in PERTURBATIONS), size)
+            world = World(meadow(HIGH), dynamics=dynamics, disturbances=(perturbed(**every),))
             ends[dynamics, size], outcomes = flown(world)
         np.testing.assert_allclose(ends[dynamics, 0.0], ends[dynamics, 1e-9], atol=1e-6)
         assert outcomes[-1]["u"][DELTA_THRUST] != 0.0
@@ -176,7 +188,51 @@ def test_a_charge_can_be_lost_at_once():
     assert lost == pytest.approx(0.25)
 
 
+# what a step does not read: the inner loop's, the sizes of tables, and what judges a sample
+NOT_FLOWN = {"gain", "governor_rows", "bounds", "faces", "fitted_trim_rad_per_mps"}
+
+
+@BOTH
+def test_what_acts_in_the_dynamics_acts_with_the_slightest_uncertainty_as_well(dynamics):
+    """The true vehicle is flown by the same step: it cannot forget a parameter."""
+    acted = 0
+    fields = VEHICLE_DTYPE.fields
+    assert fields is not None
+    floats = [n for n, (kind, *_) in fields.items() if kind.base.kind == "f" and n not in NOT_FLOWN]
+    slightly = meadow(HIGH).model_copy(update={"uncertainty": Uncertainty(mass=1e-6)})
+    worlds = [World(slightly, dynamics=dynamics), World(meadow(HIGH), dynamics=dynamics)]
+    for world in worlds:
+        flown(world, FLIGHT[:1])
+    start = worlds[1].state.x.copy()
+
+    def after_a_step(field, factor):
+        ends = []
+        for world in worlds:
+            world.state.x[:] = start
+            flies = world.state.true_vehicles if len(world.state.true_vehicles) else None
+            flies = world.arena.vehicles if flies is None else flies
+            before = flies.copy()
+            flies[field] *= factor
+            outcome = world.step({"uas_1": FLIGHT[1]})[0]
+            flies[:] = before
+            ends.append([*world.state.x[0], outcome["voltage_V"], outcome["current_A"]])
+        return np.array(ends)
+
+    nominal = after_a_step("mass_kg", 1.0)
+    for field in floats:
+        uncertain, plain = after_a_step(field, 1.01)
+        np.testing.assert_allclose(uncertain, plain, atol=1e-5, err_msg=field)
+        acted += abs(plain - nominal[1]).max() > 1e-4
+    assert acted > 15
+
+
+def test_a_disturbance_that_does_not_say_that_it_changes_vehicles_is_refused():
+    world = World(meadow(HIGH), disturbances=(SECRETLY_PERTURBING,))
+    with pytest.raises(ValueError, match="make it with perturbs=True"):
+        flown(world)
+
+
 def test_a_vehicle_without_mass_is_refused():
-    world = World(meadow(HIGH), disturbances=(deviating(mass=-1.0),))
-    with pytest.raises(ValueError, match="a deviation is -1 or less; correct their kernels"):
+    world = World(meadow(HIGH), disturbances=(perturbed(mass=-1.0),))
+    with pytest.raises(ValueError, match="a perturbation is -1 or less; correct their kernels"):
         flown(world)

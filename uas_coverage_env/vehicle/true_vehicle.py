@@ -1,0 +1,143 @@
+"""The true vehicle: a second record, whose parameters are p = (1 + perturbation) · p_nominal.
+
+A vehicle file is what planners, autopilot and records believe. Where a disturbance says that the
+vehicle that flies is another, its record is written here from the nominal one, and flown by the
+same models. The inputs are asked of the nominal vehicle: it turns its motors at the speeds that
+would give its weight plus lift, and the true one makes of these speeds another thrust, out of
+another power.
+"""
+
+import math
+from typing import NamedTuple
+
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, stack_array
+from uas_coverage_env.vehicle.battery import battery_current_A
+from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED, TILT
+
+_current = kernel(battery_current_A)
+
+
+class Perturbation(NamedTuple):
+    """A parameter in which the true vehicle may differ from the nominal one.
+
+    Attributes:
+        name: In messages and tables.
+        meaning: What is another.
+    """
+
+    name: str
+    meaning: str
+
+
+PERTURBATIONS = (
+    Perturbation("mass", "mass and weight"),
+    Perturbation("thrust", "thrust of the motors at the same speed"),
+    Perturbation("drag", "drag, horizontal and vertical"),
+    Perturbation("power", "electrical power at the same speed of the motors, avionics included"),
+    Perturbation("capacity", "capacity of the battery"),
+    Perturbation("resistance", "internal resistances of the battery"),
+)
+"""The place of a parameter is its index in the `perturbation` of a record."""
+
+N_PERTURBATIONS = len(PERTURBATIONS)
+MASS, THRUST, DRAG, POWER, CAPACITY, RESISTANCE = range(N_PERTURBATIONS)
+
+_ORDER = 4  # of the series in dt, as `governor.ORDER`
+_TERMS = _ORDER + 1
+
+
+@rare_kernel
+def write_true_vehicle(nominal, true):
+    """Write all of a record that follows from its perturbation.
+
+    The LPV model is that of the true vehicle's own file, linearised where it hovers: a tilt
+    accelerates it as it does any other. What its motors ask of the battery is counted from the
+    hover of the nominal vehicle. An attitude loop beneath it gives the torques as asked for.
+
+    Args:
+        nominal: Record of VEHICLE_DTYPE, of the vehicle file.
+        true: The same record but for its `perturbation` (N_PERTURBATIONS,) and what is written.
+
+    Raises:
+        ValueError: A perturbation is -1 or less, or not finite.
+    """
+    change = true.perturbation
+    total = 0.0
+    for k in range(N_PERTURBATIONS):
+        total += abs(change[k])
+        if change[k] <= -1.0:
+            raise ValueError(
+                "disturbances leave a UAS without mass, thrust, drag, power or battery: a "
+                "perturbation is -1 or less; correct their kernels"
+            )
+    if not math.isfinite(total):
+        raise ValueError("what disturbances do to a vehicle is not finite; correct their kernels")
+    more_mass, more_drag = 1.0 + change[MASS], 1.0 + change[DRAG]
+    true.mass_kg = nominal.mass_kg * more_mass
+    true.drag_kgps = nominal.drag_kgps * more_drag
+    true.drag_vertical_kgps = nominal.drag_vertical_kgps * more_drag
+    true.trim_rad_per_mps = nominal.trim_rad_per_mps * more_drag / more_mass
+    true.thrust_factor = nominal.thrust_factor * (1.0 + change[THRUST])
+    true.lift_surplus_N = nominal.weight_N * (change[THRUST] - change[MASS])
+    true.power_factor = nominal.power_factor * (1.0 + change[POWER])
+    _write_motion(true)
+    _write_battery(nominal, true)
+
+
+@inlined_kernel
+def _write_motion(true):
+    """The one-step maps of the axes, of the record's mass and drag."""
+    g, mass = true.gravity_mps2, true.mass_kg
+    series = stack_array(_TERMS)
+    write_series(true.dt_s, true.drag_kgps / mass, series)
+    A, B = true.axis_A, true.axis_B
+    A[POSITION, SPEED], A[SPEED, SPEED] = series[1], series[0]
+    A[POSITION, TILT], A[POSITION, RATE], B[POSITION] = g * series[2], g * series[3], g * series[4]
+    A[SPEED, TILT], A[SPEED, RATE], B[SPEED] = g * series[1], g * series[2], g * series[3]
+    true.horizontal_force_B[POSITION] = series[2] / mass
+    true.horizontal_force_B[SPEED] = series[1] / mass
+    write_series(true.dt_s, true.drag_vertical_kgps / mass, series)
+    true.vertical_A[POSITION, SPEED], true.vertical_A[SPEED, SPEED] = series[1], series[0]
+    true.vertical_B[POSITION], true.vertical_B[SPEED] = -series[2] / mass, -series[1] / mass
+
+
+@inlined_kernel
+def write_series(dt_s, rate_per_s, series):
+    """Write what a chain of integrators makes of linear drag: sum of (-r)^(k-j) dt^k / k! at j.
+
+    The sums of k from j to 4: j = 0 is what is left of a velocity after the step, 1 what a constant
+    acceleration adds to it and a velocity to the position, and so on.
+
+    Args:
+        dt_s: [s].
+        rate_per_s: Drag over mass.
+        series: (5,) written.
+    """
+    for j in range(_TERMS):
+        term = 1.0
+        for k in range(1, j + 1):
+            term *= dt_s / k
+        series[j] = term
+        for k in range(j + 1, _ORDER + 1):
+            term *= -rate_per_s * dt_s / k
+            series[j] += term
+
+
+@inlined_kernel
+def _write_battery(nominal, true):
+    """Capacity, resistances, and the linearised current of these resistances and this power."""
+    change = true.perturbation
+    more_resistance, more_power = 1.0 + change[RESISTANCE], 1.0 + change[POWER]
+    true.capacity_As = (1.0 + change[CAPACITY]) * nominal.capacity_As
+    true.resistance_0_ohm = more_resistance * nominal.resistance_0_ohm
+    true.resistance_th_ohm = more_resistance * nominal.resistance_th_ohm
+    true.hover_W = more_power * nominal.hover_W
+    for j in range(nominal.n_segments):
+        behind = nominal.ocv_V[j] - nominal.drop_V[j]
+        hover = _current(behind, true.resistance_0_ohm, true.hover_W)
+        stiffness = behind - 2.0 * true.resistance_0_ohm * hover
+        believed = behind - 2.0 * nominal.resistance_0_ohm * nominal.current_A[j]
+        true.current_A[j] = hover
+        true.current_A_per_V[j] = hover / stiffness
+        slope_W_per_N = more_power * believed * nominal.current_A_per_N[j]
+        true.current_A_per_N[j] = slope_W_per_N / stiffness
