@@ -70,7 +70,7 @@ class View(NamedTuple):
 
 @compiled
 def _whole(arena, state, tables, view, rules, spare, row):
-    step_learners(arena, state, tables, view.learners, view.scratch, rules, row)
+    step_learners(arena, state, tables, view.learners, view.scratch, rules, False, row)
 
 
 @compiled

@@ -15,7 +15,8 @@ from uas_coverage_env.autopilot.return_mode import call_home
 from uas_coverage_env.autopilot.safety import filter_commands
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World, advance, initial_state
-from uas_coverage_env.simulation.step import begin_step, carry_out
+from uas_coverage_env.simulation.flight import fly_still
+from uas_coverage_env.simulation.step import begin_step, judge
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     GO_TO,
@@ -60,7 +61,8 @@ def test_what_lies_at_the_addresses_does_what_the_functions_do():
         call_home(arena, direct, False, expected)
         steer(arena, direct, False, expected)
         filter_commands(arena, direct, False, expected)
-        carry_out(arena, direct, False, None, expected)
+        fly_still(arena, direct, expected)
+        judge(arena, direct, False, expected)
         assert outcome.tobytes() == expected.tobytes()
         for left, right in zip(called, direct, strict=True):
             assert np.array_equal(left, right)

@@ -205,7 +205,7 @@ def test_a_world_that_is_put_aside_goes_on_as_if_it_had_not_been():
 def test_without_a_disturbance_a_scenario_flies_as_ever():
     still = flown(World(meadow(HIGH)), 5, Velocity(3.0, 1.0, 20.0))
     calm = World(windy(meadow(HIGH), mean_mps=0.0, from_deg=90.0))
-    assert calm.disturbances == ()
+    assert calm.features == ()
     np.testing.assert_array_equal(flown(calm, 5, Velocity(3.0, 1.0, 20.0)), still)
     off = World(windy(meadow(HIGH), mean_mps=9.0, from_deg=90.0), disturbances=())
     np.testing.assert_array_equal(flown(off, 5, Velocity(3.0, 1.0, 20.0)), still)
@@ -236,7 +236,7 @@ def test_what_is_no_disturbance_is_refused():
     again = waypoint((150.0, 150.0, -20.0)) | {"again_after_s": (30.0,)}
     cases = [
         (lambda: World(meadow(), disturbances=push(0.0, 0.0, 0.0)), "give a tuple"),
-        (lambda: World(meadow(), disturbances=("wind",)), "no Disturbance"),
+        (lambda: World(meadow(), disturbances=("wind",)), "no Feature"),
         (lambda: World(meadow(), disturbances=(gusts(), gusts())), "a name of its own"),
         (lambda: push(math.inf, 0.0, 0.0), r"push: parameters\[0\] is inf"),
         (lambda: Disturbance("", None), "give it a name"),

@@ -1,15 +1,11 @@
 """What each kind of event does to a mission, and that the swarm comes out of it as defined."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from eventful import STARTS_M, WAYPOINTS, after, corners_m, event, field, hovering
-from own_disturbances import push
 from small_worlds import mover
 
 from uas_coverage_env import MissionBrief, World, rollout
-from uas_coverage_env.features import disturbances_of
 from uas_coverage_env.flight import accomplished, coverage, home, summary
 from uas_coverage_env.vehicle import DOD, LIFT, VX
 from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity, Wrench
@@ -108,28 +104,12 @@ def test_a_uas_that_loses_charge_comes_home_with_what_is_left():
     assert flight.last_sample[0] < flight.last_sample[1]
 
 
-def test_a_damaged_motor_of_a_mission_with_other_events_is_refused():
-    weak = event("motor_degraded", 3.0, uas="uas_1", thrust_share=0.85)
-    damaged = disturbances_of(field(weak))
-    with pytest.raises(
-        ValueError, match="belongs to an event that scenario 'meadow' does not have"
-    ):
-        World(field(), disturbances=damaged)
-
-
-def test_whatever_else_belongs_to_an_event_is_refused_where_the_scenario_lacks_it():
-    """A kernel of another package reads the event's number from its parameters, too."""
-    icing = replace(push(0.0, 0.0, 3.0), name="events[3] icing", of_event=True)
-    with pytest.raises(ValueError, match=r"'events\[3\] icing' belongs to an event"):
-        World(field(), disturbances=(icing,))
-
-
 def test_a_uas_with_a_damaged_motor_draws_more_and_climbs_less_and_comes_home():
     weak = event("motor_degraded", 3.0, uas="uas_1", thrust_share=0.85, power_factor=1.5)
     # later than the flight lasts: where something may act, missions begin with a hover
     plain = flown(event("motor_degraded", 5000.0, uas="uas_1"))
     flight = flown(weak)
-    assert flight.disturbances == ("events[0] motor_degraded",)
+    assert flight.disturbances == ("motor_degraded",)
     np.testing.assert_array_equal(flight.x[:3], plain.x[:3])
     np.testing.assert_allclose(
         (flight.voltage_V * flight.current_A)[3, 0] / (plain.voltage_V * plain.current_A)[3, 0],
@@ -270,16 +250,16 @@ def test_a_rate_draws_the_time_and_the_uas_with_the_seed():
     steps, uas = [], []
     for seed in range(400):
         world.reset(seed)
-        steps.append(int(world.state.event_step[0]))
-        uas.append(int(world.state.event_uas[0]))
+        steps.append(int(world.state.events[0].step))
+        uas.append(int(world.state.events[0].uas))
     assert np.mean(steps) == pytest.approx(60.0, rel=0.15)
     assert np.std(steps) == pytest.approx(60.0, rel=0.2)
     assert np.mean(uas) == pytest.approx(0.5, abs=0.1)
     world.reset(7)
-    again = int(world.state.event_step[0]), int(world.state.event_uas[0])
+    again = int(world.state.events[0].step), int(world.state.events[0].uas)
     assert again == (steps[7], uas[7])
     world.reset(7, mission=1)
-    assert int(world.state.event_step[0]) != steps[7]
+    assert int(world.state.events[0].step) != steps[7]
 
 
 def test_events_of_one_time_happen_together():
@@ -292,4 +272,5 @@ def test_events_of_one_time_happen_together():
 def test_a_scenario_without_events_keeps_no_memory_for_them():
     world = hovering()
     assert not world.arena.rules["eventful"][0]
-    assert {len(world.state.event_step), len(world.state.sensed), len(world.state.heard)} == {0}
+    kept = (world.state.events, world.state.measured, world.state.memory, world.state.packs)
+    assert {len(array) for array in kept} == {0}

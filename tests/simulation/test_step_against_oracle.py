@@ -82,7 +82,7 @@ def assert_same(world, before, outcome, commands):
         np.testing.assert_allclose(state.x[i], want.x, rtol=0, atol=1e-9)
         np.testing.assert_allclose(got["u"], want.u, rtol=0, atol=1e-9)
         assert state.uas[i].status == want.status
-        assert got["landed"] == (want.status == LANDED and before.status[i] == FLYING)
+        assert got["landed"] == (want.status == LANDED and before.uas[i].status == FLYING)
         assert got["voltage_V"] == pytest.approx(want.voltage_V, abs=1e-9)
         assert got["current_A"] == pytest.approx(want.current_A, abs=1e-9)
         energy_Wh = want.voltage_V * want.current_A * world.scenario.dt_s / 3600
@@ -92,7 +92,7 @@ def assert_same(world, before, outcome, commands):
         assert got["newly_covered_weight"] == pytest.approx(sum(weights))
         contact = CONTACT_NAMES[got["contact"]]
         assert contact in want.contacts if want.contacts else contact == "none"
-        assert (want.status == LOST) == (bool(want.contacts) or before.status[i] == LOST)
+        assert (want.status == LOST) == (bool(want.contacts) or before.uas[i].status == LOST)
         assert got["breaches"] == want.breaches
         assert got["too_low"] == want.too_low
         assert set(limit_names(got["limits_exceeded"])) == want.limits

@@ -299,7 +299,7 @@ def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
         _keep_last_looks(missions.worlds, missions.settled, lane, n_uas, before, observation, width)
         step_learners(
             arena, state, tables_at(pool.tables, s), learners,
-            _scratch_of(missions.scratch, thread, pool.arenas, s), rules, rows,
+            _scratch_of(missions.scratch, thread, pool.arenas, s), rules, False, rows,
         )  # fmt: skip
         over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
         if over and autoreset == NEXT_STEP:

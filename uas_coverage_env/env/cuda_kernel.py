@@ -20,7 +20,7 @@ from uas_coverage_env.env.act import (
     refuse_unflyable,
     write_commands,
 )
-from uas_coverage_env.env.kernel import ACCEPTED, finish_step
+from uas_coverage_env.env.kernel import ACCEPTED, look_around, pay_step
 from uas_coverage_env.env.memory import (
     FIRST_OBSERVATION,
     LEARNERS,
@@ -147,7 +147,8 @@ def _finish(pool, paying, observing, missions, lane):
     scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
     arena, tables = arena_of(pool.arenas, scene), tables_at(pool.tables, scene)
     seen = _look_of(missions.first_observations, lane, pool.arenas, scene)
-    finish_step(arena, state, tables, learners, scratch, paying, observing, seen.observation, True)
+    pay_step(arena, state, tables, learners, scratch, paying, True)
+    look_around(arena, state, tables, learners, scratch, observing, False, seen.observation, True)
     flies = False
     for i in range(state.uas.shape[0]):
         missions.rewards[lane, i] = learners.amounts[i, REWARD]

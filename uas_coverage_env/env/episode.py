@@ -19,9 +19,8 @@ from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import (
-    first_observation,
+    first_learners,
     learners_sizes,
-    observe_scene,
     tables_of,
 )
 from uas_coverage_env.scenario import Room, Scenario
@@ -99,15 +98,12 @@ class Episode:
 
     def _see_anew(self) -> None:
         """Go on in a scene that has changed: UAS are the same, waypoints keep their indices."""
-        world, before = self._world, (*self._learners, *self._scratch)
+        before = (*self._learners, *self._scratch)
         self._lay_out()
         for array, old in zip((*self._learners, *self._scratch), before, strict=True):
             array[: len(old)] = old
         self._prepare()
-        observe_scene(
-            world.arena, world.state, self.tables, self._learners, self._observing,
-            self.observation,
-        )  # fmt: skip
+        self._look()
 
     def _prepare(self) -> None:
         world = self._world
@@ -134,7 +130,7 @@ class Episode:
         seen = self.observation
         # to assign a record field by field takes ten times as long
         self._scratch_bytes = [array.view(np.uint8) for array in self._scratch]
-        self._step = machine_code(step_episode, (*self._given, seen, seen))
+        self._step = machine_code(step_episode, (*self._given, False, seen, seen))
 
     def __getstate__(self) -> dict[str, Any]:
         # neither machine code nor addresses and views travel
@@ -160,17 +156,30 @@ class Episode:
             self._lay_out()
             self._prepare()
         self.steps = 0
-        if self._first is None:
-            self._first = first_observation(
-                self._world.arena, self._world.state, self.tables, self._observing, self._sizes
-            )
-        first, observation = self._first
+        first, observation = self._first or self._look_first()
         for array, start in zip(self._learners, first, strict=True):
             array[:] = start
         for array in self._scratch_bytes:
             array[:] = 0
         self.observation = observation.copy()
         self.amounts = self._learners.amounts.tolist()
+
+    def _look_first(self) -> tuple[Learners, NDArray[np.float32]]:
+        """What missions begin with, always the same; kept."""
+        first = first_learners(self._world.arena, self._world.state, self._sizes)
+        for array, start in zip(self._learners, first, strict=True):
+            array[:] = start
+        self.observation = np.zeros(self._observation_shape, np.float32)
+        self._look()
+        self._first = (
+            self._learners._make(array.copy() for array in self._learners),
+            self.observation,
+        )
+        return self._first
+
+    def _look(self) -> None:
+        """Observe a scene that is new to those that fly."""
+        self._step(*self._given, True, self.observation, self.observation)
 
     def step(self) -> list[list[int]]:
         """Fly what was asked for one step.
@@ -184,7 +193,7 @@ class Episode:
         """
         observation = _empty(self._observation_shape, _FLOAT32)
         at, nonlinear = self._given
-        invalid = self._step(at, nonlinear, self.observation, observation)
+        invalid = self._step(at, nonlinear, False, self.observation, observation)
         if invalid != ACCEPTED:
             numbers_asked = self.asked[invalid].tolist()
             self.asked[invalid] = 0.0

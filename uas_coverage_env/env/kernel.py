@@ -46,8 +46,8 @@ class Rules(NamedTuple):
 
 
 @inlined_kernel
-def finish_step(arena, state, tables, learners, scratch, paying, observing, observation, on_gpu):
-    """Reward and observe a step; arguments as for `step_learners` and `compute_rewards`."""
+def pay_step(arena, state, tables, learners, scratch, paying, on_gpu):
+    """Reward and report a step; arguments as for `step_learners` and `compute_rewards`."""
     report, amounts = learners.report, learners.amounts
     outcome = scratch.outcome
     compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu)
@@ -70,19 +70,30 @@ def finish_step(arena, state, tables, learners, scratch, paying, observing, obse
         amounts[i, REWARD] = reward
     if newly_covered > 0:
         write_around(state.uncovered, tables.neighbours, learners.around)
-    seen = as_observed(state)
     for i in range(report.shape[0]):
-        flew = outcome[i].flew
-        if rarely(not flew and state.uas[i].status == FLYING):
+        if rarely(not outcome[i].flew and state.uas[i].status == FLYING):
             # where it was to go before it swapped packs is forgotten
             learners.targets[i] = NO_TARGET
-        if flew or state.uas[i].status == FLYING or state.uas[i].status == SWAPPING:
+
+
+@inlined_kernel
+def look_around(arena, state, tables, learners, scratch, observing, new_scene, observation, on_gpu):
+    """Observe a step, or a scene that is new to those that fly; arguments as for `step_learners`.
+
+    In a new scene only those that fly look around; what others have seen last stays.
+    """
+    if rarely(new_scene):
+        write_around(state.uncovered, tables.neighbours, learners.around)
+    seen = as_observed(state)
+    for i in range(state.uas.shape[0]):
+        status = state.uas[i].status
+        if status == FLYING or (not new_scene and (scratch.outcome[i].flew or status == SWAPPING)):
             observe_one(arena, seen, tables, learners, observing, i, observation[i], on_gpu)
 
 
 @inlined_kernel
-def step_learners(arena, state, tables, learners, scratch, rules, observation):
-    """Fly one step, pay for it and look around.
+def step_learners(arena, state, tables, learners, scratch, rules, new_scene, observation):
+    """Fly one step and pay for it, or find a new scene; and look around.
 
     Args:
         arena: The arena.
@@ -91,16 +102,19 @@ def step_learners(arena, state, tables, learners, scratch, rules, observation):
         learners: `Learners` with the actions, all finite; written.
         scratch: `Scratch`; written.
         rules: `Rules`.
+        new_scene: Nothing is flown: the scene is another than before.
         observation: (U, V) float32; that of a UAS that did not fly stays.
     """
-    seen = as_observed(state)
-    write_commands(arena, seen, tables, learners, scratch, rules.acting, None)
-    advance(
-        arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.code,
-        scratch.outcome,
-    )  # fmt: skip
-    finish_step(
-        arena, state, tables, learners, scratch, rules.paying, rules.observing, observation, None
+    if not rarely(new_scene):
+        seen = as_observed(state)
+        write_commands(arena, seen, tables, learners, scratch, rules.acting, None)
+        advance(
+            arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.code,
+            scratch.outcome,
+        )  # fmt: skip
+        pay_step(arena, state, tables, learners, scratch, rules.paying, None)
+    look_around(
+        arena, state, tables, learners, scratch, rules.observing, new_scene, observation, None
     )
 
 
@@ -109,7 +123,7 @@ _N_NUMBERS = EPISODE.size
 
 
 @kernel
-def step_episode(at, nonlinear, before, observation):
+def step_episode(at, nonlinear, new_scene, before, observation):
     """`step_learners` called from Python.
 
     What a UAS that does not fly has seen last, in `before`, stays in `observation`.
@@ -118,6 +132,7 @@ def step_episode(at, nonlinear, before, observation):
         at: Where the arrays of `EPISODE` lie, then number and addresses of the assistants, then
             what features do: to hand over every array would take longer than the flight of a UAS.
         nonlinear: See `Rules`.
+        new_scene: See `step_learners`.
         before: (U, V) float32, the observation of the step before.
         observation: (U, V) float32, another array; written.
 
@@ -136,5 +151,5 @@ def step_episode(at, nonlinear, before, observation):
     first = _N_NUMBERS + 1 + at[_N_NUMBERS]
     code = slice_view(at, first, at.shape[0] - first)
     rules = Rules(acting, nonlinear, assistants, code, paying, observing)
-    step_learners(arena, state, tables, learners, scratch, rules, observation)
+    step_learners(arena, state, tables, learners, scratch, rules, new_scene, observation)
     return ACCEPTED

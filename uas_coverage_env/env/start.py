@@ -62,16 +62,21 @@ def first_observation(
     Returns:
         The learners' arrays, and the observations, (U, V).
     """
-    sizes = ARENA.sizes_of(arena, sizes)
-    learners = LEARNERS.zeros(sizes)
+    learners = first_learners(arena, state, sizes)
+    first = FIRST_OBSERVATION.zeros(ARENA.sizes_of(arena, sizes))
+    observe_scene(arena, state, tables, learners, observing, first.observation)
+    return learners, first.observation
+
+
+def first_learners(arena: Arena, state: WorldState, sizes: dict[str, int]) -> Learners:
+    """The learners' arrays at t = 0, before anything is observed; arguments as above."""
+    learners = LEARNERS.zeros(ARENA.sizes_of(arena, sizes))
     learners.targets[:] = NO_TARGET
     learners.candidates[:] = -1
     learners.report[:, CONTACT_WITH] = -1
     learners.report[:, STATUS] = state.uas["status"]
     learners.report[:, COVERED] = (~state.uncovered).sum()
-    first = FIRST_OBSERVATION.zeros(sizes)
-    observe_scene(arena, state, tables, learners, observing, first.observation)
-    return learners, first.observation
+    return learners
 
 
 def observe_scene(

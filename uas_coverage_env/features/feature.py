@@ -128,6 +128,10 @@ class Disturbance(Feature):
         ValueError: A parameter is not finite, or the name is empty.
     """
 
+    act: Any
+    parameters: tuple[float, ...]
+    common: bool
+
     def __init__(
         self,
         name: str,
@@ -145,7 +149,17 @@ class Disturbance(Feature):
             perturbs=perturbs,
         )
         # frozen, as all features are
-        self.__dict__.update(act=act, parameters=parameters, common=common)
+        self.__dict__.update(act=act, parameters=tuple(parameters), common=common)
+
+    @property
+    def _said(self) -> tuple[Any, ...]:
+        return self.name, self.act, self.parameters, self.common, self.perturbs
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Disturbance) and self._said == other._said
+
+    def __hash__(self) -> int:
+        return hash(self._said)
 
 
 @cache

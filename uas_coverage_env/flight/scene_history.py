@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.flight.record import LANDED, LOST, EventRecord, FlightRecord
 from uas_coverage_env.scenario import NoFlyZone, Scenario
+from uas_coverage_env.scenario.scene_events import WaypointDropped
 from uas_coverage_env.vehicle import VZ
 from uas_coverage_env.world.coverage import covering_samples
 from uas_coverage_env.world.events import steps_until
@@ -148,9 +149,8 @@ class _Story:
 
     def _happen(self, sample: int, record: EventRecord) -> None:
         event = self._flight.scenario.events[record.event]
-        effect = event.effect()
-        if effect.name == "drop":
-            self.dropped.setdefault(int(effect.values[0]), sample)
+        if isinstance(event, WaypointDropped):
+            self.dropped.setdefault(event.waypoint, sample)
         if event.changes_scene:
             names = self._flight.names
             uas = names.index(record.uas) if record.uas in names else 0

@@ -153,10 +153,12 @@ def fly(arena, state, nonlinear, code, outcome):
         arena: The arena.
         state: The state; written.
         nonlinear: Whether the 6-DOF plant is flown.
-        code: `FeatureCode`.
+        code: `FeatureCode`; None: no mission has any feature, and all fly the linear model.
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
-    if rarely(nonlinear or arena.rules[0].disturbed):
+    if code is None:
+        fly_still(arena, state, outcome)
+    elif rarely(nonlinear or arena.rules[0].disturbed):
         fly_at(code[FLY], arena, state, nonlinear, code, outcome)
     else:
         fly_still(arena, state, outcome)

@@ -7,7 +7,7 @@ from numba import typeof, types
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.calls import Signature
-from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
+from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import STATE
@@ -76,10 +76,10 @@ def call_features(point, arena, state, code, outcome):
         point: One of `Point`, after BEGIN.
         arena: The arena.
         state: The state.
-        code: `FeatureCode`.
+        code: `FeatureCode`; None: no mission has any.
         outcome: (U,) of OUTCOME_DTYPE.
     """
-    if rarely(code[point] < code[point + 1]):
+    if code is not None:
         for k in range(code[point], code[point + 1], 2):
             if arena.features[code[k]].acts:
                 _call(code[k + 1], arena, state, outcome, code[k])

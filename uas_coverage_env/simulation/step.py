@@ -129,7 +129,7 @@ def advance(arena, state, commands, nonlinear, assistants, code, outcome):
         commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
         nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
         assistants: What helps to fly, see `assistants`. Commands of kind GO_TO need guidance.
-        code: `FeatureCode` of what is in the arena.
+        code: `FeatureCode` of what is in the arena; None: see `fly`.
         outcome: (U,) of OUTCOME_DTYPE; written.
     """
     begin_step(state, commands, outcome)
