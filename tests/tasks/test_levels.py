@@ -11,7 +11,8 @@ import pytest
 
 from uas_coverage_env import registration
 from uas_coverage_env.env import CoverageParallelEnv
-from uas_coverage_env.scenario.events import MotorDegraded, RadioLost
+from uas_coverage_env.features.motor import MotorDegraded
+from uas_coverage_env.features.radio import RadioLost
 from uas_coverage_env.tasks import LEVELS, SPLITS, level_named, parallel_env, seeds_of
 
 LEVEL_NAMES = tuple(LEVELS)

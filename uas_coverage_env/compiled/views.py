@@ -166,7 +166,7 @@ class Layout:
 def replaced(memory: Memory[T], name: str) -> Callable[[T, Any], T]:
     """A function for kernels, (arrays, array) -> the declaration with this array of that name."""
     if not COMPILED:
-        return lambda arrays, array: arrays._replace(**{name: array})
+        return lambda arrays, array: memory.made_of({**arrays._asdict(), name: array})
     known: dict[str, Any] = {}
     kept = ("array" if f.name == name else f"arrays.{f.name}" for f in memory.fields)
     return _kernel_of("arrays, array", _declared(memory, kept, known), known)
