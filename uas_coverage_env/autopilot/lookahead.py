@@ -4,7 +4,7 @@ import math
 
 from uas_coverage_env.autopilot.belief import believed_kinematics, believed_wrench
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, stack_array
 from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
 from uas_coverage_env.vehicle import (
     N_INPUTS,
@@ -111,7 +111,7 @@ def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m, belief
     return fly_hold_and_brake(arena, i, start, reference, command, 1, nonlinear, path_m, belief)
 
 
-@inlined_kernel
+@rare_kernel
 def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, path_m, belief=None):
     """Like `fly_and_brake`, with the command flown for n_held steps."""
     n_steps = path_m.shape[0] - 1
@@ -217,7 +217,7 @@ def _height_slack(arena, i, path_m, n_flown, slack_m):
     return slack_m
 
 
-@inlined_kernel
+@rare_kernel
 def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
     """Least distance to spare from geofence, fixed obstacles and least height along a path.
 
@@ -280,7 +280,7 @@ def required_from(arena, step, i, m):
     return required_m + SURPRISE_S * speed_mps
 
 
-@inlined_kernel
+@rare_kernel
 def moving_slack(arena, step, i, path_m, enough_m, slack_m):
     """Least distance to spare from moving obstacles that keep their present velocities.
 
@@ -357,7 +357,7 @@ def separation_at(path_m, other_m, k):
     )
 
 
-@inlined_kernel
+@rare_kernel
 def peer_slack(arena, status, i, path_m, committed_m, enough_m, slack_m):
     """Least distance to spare from the paths to which the other UAS are committed.
 

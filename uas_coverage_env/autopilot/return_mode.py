@@ -3,7 +3,7 @@
 import math
 
 from uas_coverage_env.autopilot.guidance import path_length_home_m
-from uas_coverage_env.autopilot.way_home import flight_home, latest_flight_home
+from uas_coverage_env.autopilot.return_path import flight_home, latest_flight_home
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.vehicle import DOD, Z
 from uas_coverage_env.vehicle.range import SpeedLimits, TravelTimeModel, flight_seconds

@@ -5,15 +5,14 @@ import math
 from uas_coverage_env.autopilot.belief import estimated_speed, vertical_margin_mps
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_position
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import VX, VY, X, Y, Z
 from uas_coverage_env.vehicle.range import margin_to_land, seconds_to_land
 from uas_coverage_env.world.commands import HOME
 from uas_coverage_env.world.overhangs import is_below_overhang, widest_overhang_m
+from uas_coverage_env.world.places import may_be_at
 from uas_coverage_env.world.routes import (
     CLEAR,
     ROUND_CORNER,
-    box_apart,
     crossing,
     leg_from_corner,
     route,
@@ -149,24 +148,6 @@ def flight_home(arena, i, x, belief=None):
 
 
 @kernel
-def _may_rest_at(arena, i, x, y, z):
-    """Whether a UAS can be at a place without a breach."""
-    rules = arena.rules[0]
-    normals, offsets_m = arena.normals, arena.offsets_m
-    first, last = rules.fence_first, rules.fence_last
-    if signed_distance(normals, offsets_m, first, last, x, y, z) > -rules.fence_margin_m:
-        return False
-    for o in range(arena.obstacles.shape[0]):
-        obstacle = arena.obstacles[o]
-        if not box_apart(obstacle, x, y, z, x, y, z):
-            first, last = obstacle.first_kept, obstacle.last_kept
-            required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
-            if signed_distance(normals, offsets_m, first, last, x, y, z) < required_m:
-                return False
-    return True
-
-
-@kernel
 def latest_flight_home(arena, i, x, belief):
     """Time to fly UAS i home if it flies one more step, whatever its command [s].
 
@@ -195,7 +176,7 @@ def latest_flight_home(arena, i, x, belief):
         aside_m = around_m * ((k + _PLACES_AROUND - 1) // _PLACES_AROUND)
         north_m = x[X] + on_s * x[VX] + aside_m * math.cos(angle)
         east_m = x[Y] + on_s * x[VY] + aside_m * math.sin(angle)
-        if _may_rest_at(arena, i, north_m, east_m, z):
+        if may_be_at(arena, i, north_m, east_m, z):
             seconds, margin_s = _flight_from(arena, i, north_m, east_m, z, 0.0, belief)
             latest_s = max(latest_s, seconds + margin_s)
     return dt_s + stopping_s + latest_s

@@ -10,10 +10,10 @@ import math
 
 from uas_coverage_env.autopilot.belief import estimated_speed, speed_along, wind_growth
 from uas_coverage_env.compiled.kernels import kernel, stack_array
-from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import X, Y, Z
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.obstacles import NODE_MARGIN_M
+from uas_coverage_env.world.places import inside_fence_m
 from uas_coverage_env.world.routes import crossing
 from uas_coverage_env.world.state import WIND
 
@@ -54,10 +54,7 @@ def _seconds(arena, i, belief, x0, y0, x1, y1, share):
 @kernel
 def _is_free(arena, x0, y0, x1, y1, z):
     """Whether a leg crosses no widened footprint and ends outside of all, inside the fence."""
-    rules = arena.rules[0]
-    first, last = rules.fence_first, rules.fence_last
-    within_m = rules.fence_margin_m + NODE_MARGIN_M
-    if signed_distance(arena.normals, arena.offsets_m, first, last, x1, y1, z) > -within_m:
+    if inside_fence_m(arena, x1, y1, z) < arena.rules[0].fence_margin_m + NODE_MARGIN_M:
         return False
     for o in range(arena.obstacles.shape[0]):
         at, over, ends = crossing(
