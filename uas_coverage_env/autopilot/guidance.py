@@ -20,7 +20,7 @@ from uas_coverage_env.compiled.kernels import (
     rare_kernel,
 )
 from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.arena import Arena
 from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY, GoTo, Velocity, command_mode
 from uas_coverage_env.world.height import lowest_altitude
@@ -111,7 +111,7 @@ def target_position(arena, i, target):
 def path_length_home_m(arena, i, x):
     """Length [m] of the horizontal way home of UAS i past the tall obstacles."""
     row, x1, y1, z1 = target_position(arena, i, HOME)
-    return route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)[2]
+    return route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)[2]
 
 
 @inlined_kernel
@@ -148,14 +148,14 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
 
     -inf where there is no roof.
     """
-    altitude_m = -x[Z]
-    length_m = math.hypot(x1 - x[X], y1 - x[Y])
+    altitude_m = -x[S.Z]
+    length_m = math.hypot(x1 - x[S.X], y1 - x[S.Y])
     needed_m = -math.inf
     speed_mps = arena.uas[i].speed_mps
     ceiling_m = arena.rules[0].ceiling_m
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
-        at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[X], x[Y], x1, y1)
+        at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[S.X], x[S.Y], x1, y1)
         if at > 1.0:
             continue
         roof_m = obstacle.roof_m
@@ -205,9 +205,9 @@ def _passing_speed(arena, i, x, target, distance_m, altitude1_m):
     passing_mps = min(_PASSING_SHARE * uas.speed_mps, _PASSING_PER_S * radius_m)
     before_m = max(0.0, distance_m - _SLOWED_M)
     speed_mps = min(uas.speed_mps, passing_mps + _SLOWING_PER_S * before_m)
-    missing_m = abs(altitude1_m + x[Z]) - _HEIGHT_SHARE * radius_m
+    missing_m = abs(altitude1_m + x[S.Z]) - _HEIGHT_SHARE * radius_m
     if missing_m > 0.0:
-        rate_mps = uas.climb_mps if altitude1_m > -x[Z] else uas.descent_mps
+        rate_mps = uas.climb_mps if altitude1_m > -x[S.Z] else uas.descent_mps
         climbing_s = missing_m / rate_mps + LEAD_S
         speed_mps = min(speed_mps, _CLIMBING_MPS + distance_m / climbing_s)
     return speed_mps
@@ -231,9 +231,9 @@ def _altitude(arena, i, x, altitude1_m, way_m, needed_m):
     """Altitude to hold [m]: descend along a glide slope, but stay over what has to be passed."""
     rules = arena.rules[0]
     glide_m = altitude1_m + _GLIDE_SLOPE * max(0.0, way_m - _GLIDE_ENDS_M)
-    cruise_m = max(-x[Z], rules.floor_m + CRUISE_ALTITUDE_M)
+    cruise_m = max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M)
     altitude_m = max(altitude1_m, min(cruise_m, glide_m), needed_m)
-    floor_m = lowest_altitude(arena, i, x[X], x[Y])
+    floor_m = lowest_altitude(arena, i, x[S.X], x[S.Y])
     return min(max(altitude_m, floor_m), max(rules.ceiling_m, altitude1_m))
 
 
@@ -247,15 +247,15 @@ def _next_leg(arena, i, x, target, stop, belief):
         where the UAS flies low at once.
     """
     row, x1, y1, z1 = target_position(arena, i, target)
-    end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
+    end_x, end_y, way_m, leg = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
     if leg != CLEAR and arena.rules[0].overhangs:
         place_m = np.empty(3)
-        first = past_overhangs(arena, i, x[X], x[Y], x[Z], x1, y1, z1, place_m)
+        first = past_overhangs(arena, i, x[S.X], x[S.Y], x[S.Z], x1, y1, z1, place_m)
         if first != LEG_TO_TARGET:
             x1, y1, z1 = place_m[0], place_m[1], place_m[2]
             end_x, end_y, way_m, leg = x1, y1, 0.0, CLEAR
             if first == TARGET_IS_PLACE:
-                end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
+                end_x, end_y, way_m, leg = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
             stop = True
     if belief is not None and arena.rules[0].disturbed and target < 0:
         needed_m, _ = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
@@ -287,14 +287,14 @@ def _write_safe(
         wanted_m = altitude_m
         if height == _LEVEL:
             # what is in the way of a descent is not in the way of staying up
-            wanted_m = max(altitude_m, -x[Z] - x[VZ])
-        elif height == _IN_PLACE and abs(altitude_m + x[Z]) <= HEADROOM_M:
+            wanted_m = max(altitude_m, -x[S.Z] - x[S.VZ])
+        elif height == _IN_PLACE and abs(altitude_m + x[S.Z]) <= HEADROOM_M:
             continue
         elif height == _STRAIGHT_ON:
             if leg != CLEAR or not arena.rules[0].overhangs:
                 continue
             # what is in the way of a climb is not in the way of the straight line
-            wanted_m = -x[Z] - x[VZ]
+            wanted_m = -x[S.Z] - x[S.VZ]
         shown_north_mps = along * north_mps - aside * east_mps
         shown_east_mps = aside * north_mps + along * east_mps
         write_command(command, VELOCITY, shown_north_mps, shown_east_mps, wanted_m)
@@ -324,15 +324,15 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
     end_x, end_y, altitude1_m, way_m, leg, stop = _next_leg(arena, i, x, target, stop, belief)
     lead_s = LEAD_S
     if not stop:
-        left_m = math.hypot(end_x - x[X], end_y - x[Y])
-        lead_s = min(LEAD_S, _LEAD_SHARE * left_m / (math.hypot(x[VX], x[VY]) + _NOWHERE_M))
-    ahead_x = end_x - x[X] - lead_s * x[VX]
-    ahead_y = end_y - x[Y] - lead_s * x[VY]
+        left_m = math.hypot(end_x - x[S.X], end_y - x[S.Y])
+        lead_s = min(LEAD_S, _LEAD_SHARE * left_m / (math.hypot(x[S.VX], x[S.VY]) + _NOWHERE_M))
+    ahead_x = end_x - x[S.X] - lead_s * x[S.VX]
+    ahead_y = end_y - x[S.Y] - lead_s * x[S.VY]
     path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
     brakes_late = _brakes_late(arena, i, belief, target, leg)
     if brakes_late:
         fly_and_brake(arena, i, x, reference, arena.rules[0].brake, nonlinear, path_m, belief)
-        ahead_x, ahead_y = end_x - path_m[-1, X], end_y - path_m[-1, Y]
+        ahead_x, ahead_y = end_x - path_m[-1, S.X], end_y - path_m[-1, S.Y]
     distance_m = math.hypot(ahead_x, ahead_y)
     needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, altitude1_m, leg)
     approach_mps = _approach_speed(
@@ -402,5 +402,5 @@ def velocity_of(
         (_, per_speed), (_, kept) = vehicle["vertical_A"].tolist()
         way, speed = vehicle["vertical_B"].tolist()
         stopping_s = per_speed - way / speed * kept
-        altitude_m = -float(state.x[i, Z] + stopping_s * state.x[i, VZ])
+        altitude_m = -float(state.x[i, S.Z] + stopping_s * state.x[i, S.VZ])
     return Velocity(north_mps, east_mps, altitude_m, command_mode(command))

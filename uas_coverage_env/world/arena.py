@@ -255,7 +255,8 @@ def _vehicles(scenario: Scenario) -> NDArray[np.void]:
 
 def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions [m] and velocities [m/s] of the moving obstacles at every sample, (T+1, M, 3)."""
-    time_s = scenario.dt_s * np.arange(scenario.max_steps + SAMPLES_AFTER_END + 1)
+    n_samples = scenario.max_steps + SAMPLES_AFTER_END + 1
+    time_s = scenario.dt_s * np.arange(n_samples, dtype=np.float64)
     return scenario.moving_positions(time_s), scenario.moving_velocities(time_s)
 
 

@@ -72,17 +72,8 @@ def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
     The distance D is convex. From the middle of an obstacle's box to its walls, where it is
     near_m, it has risen by rise_m; farther out it rises at least as fast.
 
-    Args:
-        columns: (N_COLUMNS, C).
-        first: Index of the first obstacle.
-        n: Number of columns, at most BLOCK.
-        x0: Start of the segment, north [m]; then east, down, and its end.
-        y0: See x0.
-        z0: See x0.
-        x1: See x0.
-        y1: See x0.
-        z1: See x0.
-        bound_m: (n or more,) [m] written; -inf where the boxes meet.
+    Of the n columns from `first` on, at most BLOCK: written to `bound_m`, -inf where the boxes
+    meet.
     """
     x_low, x_high = min(x0, x1), max(x0, x1)
     y_low, y_high = min(y0, y1), max(y0, y1)

@@ -177,7 +177,7 @@ def route(arena, target, x0, y0, z0, x1, y1, z1):
     """The next leg on the shortest way to a target past the fixed obstacles.
 
     Args:
-        arena: The arena.
+        arena: The mission.
         target: Row of `node_distance_m`: a waypoint, or W + the UAS for its start.
         x0: North of the UAS [m].
         y0: East of the UAS [m].
