@@ -34,8 +34,8 @@ seconds in a wind as fast as the UAS, in which it turns and stops the more slowl
 too little: `benchmarks/returns.py --level moderate`."""
 
 _LEAVING_MPS, _LEAVING_S = 0.6, 15.0
-"""From below an overhang a UAS feels its way at about this speed, and turns at both ends. Fitted to
-`benchmarks/return_mode.py --families overhangs`, which loses none."""
+"""From below an overhang a UAS feels its way at about this speed, and turns at both ends. Chosen by
+hand; `benchmarks/return_mode.py --families overhangs` shows whether UAS are lost."""
 
 
 @inlined_kernel
