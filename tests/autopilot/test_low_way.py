@@ -4,7 +4,7 @@ import pytest
 from small_worlds import box, meadow
 
 from uas_coverage_env import World, load_planner, rollout
-from uas_coverage_env.autopilot.low_way import LITTLE_MPS, low_way
+from uas_coverage_env.autopilot.low_altitude_return import LITTLE_MPS, low_way
 from uas_coverage_env.entities.state import WIND
 from uas_coverage_env.features.wind import Wind
 from uas_coverage_env.flight import home

@@ -7,7 +7,7 @@ import pytest
 from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env import load_scenario, rollout
-from uas_coverage_env.autopilot.way_out import way_out
+from uas_coverage_env.autopilot.exit_overhang import way_out
 from uas_coverage_env.flight.record import LANDED as FLIGHT_LANDED
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import LANDED, GoTo

@@ -198,6 +198,13 @@ def test_the_helicopter_of_the_village_waits_climbs_and_leaves_to_the_east():
         np.testing.assert_array_equal(village.moving_velocities(time_s), [expected])
 
 
+def test_many_times_at_once_give_what_each_gives_to_the_bit():
+    times_s = 0.3 * np.arange(900)
+    village = load_scenario("village")
+    for at in (village.moving_positions, village.moving_velocities):
+        assert at(times_s).tolist() == [at(time_s).tolist() for time_s in times_s.tolist()]
+
+
 SPEED = st.floats(-20, 20)
 
 

@@ -2,14 +2,18 @@
 
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.autopilot.control import write_brake, write_command
-from uas_coverage_env.autopilot.guidance import guide, path_length_home_m, target_position
-from uas_coverage_env.autopilot.guided import velocity_of
+from uas_coverage_env.autopilot.guidance import (
+    guide,
+    path_length_home_m,
+    target_position,
+    velocity_of,
+)
 from uas_coverage_env.autopilot.return_mode import (
     has_to_return,
     seconds_home,
     seconds_to_keep,
 )
-from uas_coverage_env.autopilot.way_home import flight_home
+from uas_coverage_env.autopilot.return_path import flight_home
 
 __all__ = [
     "AssistantCode",

@@ -1,15 +1,14 @@
 """From a command to the wrench that flies it."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.entities.commands import ACCELERATION, CLIMB, VELOCITY
+from uas_coverage_env.entities.commands import ACCELERATION, CLIMB, N_VALUES, VELOCITY
 from uas_coverage_env.vehicle import (
-    LIFT,
-    TAU_Z,
     acceleration_wrench,
     clip_wrench,
     velocity_climb_wrench,
     velocity_wrench,
 )
+from uas_coverage_env.vehicle import layout as S
 
 
 @kernel
@@ -19,7 +18,7 @@ def write_command(command, kind, first, second, third):
     command.values[0] = first
     command.values[1] = second
     command.values[2] = third
-    command.values[TAU_Z] = 0.0  # of a wrench alone
+    command.values[N_VALUES - 1] = 0.0  # of a wrench alone
 
 
 @kernel
@@ -30,15 +29,7 @@ def write_brake(command):
 
 @inlined_kernel
 def command_wrench(vehicle, x, reference, command, u):
-    """Write into u the wrench for one step of a command, within the vehicle's limits.
-
-    Args:
-        vehicle: The compiled vehicle.
-        x: (14,) state.
-        reference: (2,) [m/s] the inner loop's governed velocity; updated.
-        command: A record of COMMAND_DTYPE, of any kind but GO_TO.
-        u: (5,) inputs; lift and torques are written.
-    """
+    """Write into u the wrench for one step of a command, within the vehicle's limits."""
     steered_wrench(vehicle, x, reference, command, command.values[0], command.values[1], u)
 
 
@@ -57,7 +48,7 @@ def steered_wrench(vehicle, x, reference, command, first, second, u):
     elif kind == ACCELERATION:
         acceleration_wrench(vehicle, x, reference, first, second, values[2], u)
     else:
-        for k in range(LIFT, TAU_Z + 1):
+        for k in range(S.LIFT, S.TAU_Z + 1):
             u[k] = values[k]
     # the set U holds for every input, whoever made it
     clip_wrench(vehicle, u)

@@ -1,27 +1,32 @@
-"""A velocity command that flies a UAS to a waypoint or home, past the fixed obstacles."""
+"""A velocity command that flies a UAS to a waypoint or home, past the fixed obstacles.
+
+Constants without a source were chosen by hand on flights of the village. What they cost is shown by
+`benchmarks/returns.py` for the way home, and by `benchmarks/missions.py --planners
+nearest-waypoint` for flights past waypoints.
+"""
 
 import math
 
 import numpy as np
 
 from uas_coverage_env.autopilot.control import write_brake, write_command
+from uas_coverage_env.autopilot.exit_overhang import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
-from uas_coverage_env.autopilot.low_way import low_way
-from uas_coverage_env.autopilot.way_out import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
-from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
-from uas_coverage_env.entities.commands import GO_TO, HOME, VELOCITY
-from uas_coverage_env.entities.state import FLYING, WIND
-from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world.height import lowest_altitude
-from uas_coverage_env.world.routes import (
-    CLEAR,
-    NO_WAY,
-    ROUND_CORNER,
-    crossing,
-    level_apart,
-    route,
+from uas_coverage_env.autopilot.low_altitude_return import low_way
+from uas_coverage_env.compiled.kernels import (
+    allocating_kernel,
+    inlined_kernel,
+    kernel,
+    rare_kernel,
 )
+from uas_coverage_env.entities.commands import GO_TO, HOME, VELOCITY, GoTo, Velocity, command_mode
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import FLYING, WIND, WorldState
+from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.world.arena import Arena
+from uas_coverage_env.world.height import lowest_altitude
+from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, level_apart, route
 
 LEAD_S = 1.6
 """The inner loop follows a velocity with about this delay; guidance steers from ahead [s]."""
@@ -29,26 +34,67 @@ LEAD_S = 1.6
 CRUISE_ALTITUDE_M = 8.0
 """On a longer way UAS do not sink below this altitude above the floor [m]."""
 
-_GLIDE_SLOPE = 0.12
 HEADROOM_M = 0.5
 """Roofs are passed this much above the distance of routes [m]."""
 
+_GLIDE_SLOPE = 0.12  # metres down a metre of way, towards the altitude of the target [-]
+_GLIDE_ENDS_M = 15.0  # before the target [m]
+
 _TIGHT_M = 3.0
 """A corner so near to what routes avoid of two obstacles lies in a gap that is seen through from
-there alone: UAS come to rest at it before they turn."""
+there alone: UAS come to rest at it before they turn [m]."""
+
+_STOPPING_PER_S = 0.28
+"""Speed over distance on the way to a stop [1/s]."""
+
+_CORNER_SHARE, _CORNER_PER_S = 0.65, 0.25
+"""Speed round a corner, of the highest [-], and by how much faster a metre before it [1/s]."""
+
+_PASSING_SHARE, _PASSING_PER_S = 0.75, 0.8
+"""Speed past a waypoint: of the highest [-], and over its radius [1/s], whichever is less."""
+
+_SLOWING_PER_S, _SLOWED_M = 0.2, 8.0
+"""By how much faster a metre before it [1/s], down to this distance from it [m]."""
+
+_HEIGHT_SHARE, _CLIMBING_MPS = 0.6, 0.5
+"""Of its radius, how far above or below its centre a waypoint is covered for sure [-]; and what is
+flown towards it in any case while climbing [m/s]."""
+
+_LEAD_SHARE = 0.5
+"""Of the time left to what is flown by, how far ahead guidance looks at most [-]: to look beyond it
+would turn the UAS round before it gets there."""
 
 _TO_HOME = 0.85
 """Of the way from where braking would end to home, what a UAS that lands in wind flies in a second
-or a step, whichever is longer: a velocity held for a step moves that end on by the way of a step.
-"""
+or a step, whichever is longer: a velocity held for a step moves that end on by the way of a step
+[-]. `benchmarks/returns.py --level moderate` shows what it saves."""
 
 _WIND_TO_HURRY = 0.5
 """Of the highest airspeed: in a stronger wind a gust may take all of it, and braking takes longer
-than simulated. There, as in still air, a UAS comes home slowly."""
+than simulated. There, as in still air, a UAS comes home slowly [-]. Without it, 2 of 151 UAS were
+blown over the fence (docs/wind_method.md)."""
 
-_SHARES_OF_SPEED = (1.0, 0.7, 0.4, 0.15)
-_TURNS = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
-_SHARE_WHEN_TURNED = 0.4
+_AS_WISHED, _LEVEL, _IN_PLACE, _STRAIGHT_ON = range(4)
+
+
+def _tries() -> np.ndarray:
+    """(T, 3) what is flown of a wish, the first that leaves room to brake: see `_write_safe`.
+
+    Factors by which its velocity is shortened and turned (along and to the right of it), and the
+    height: slower and without descending, up or down in place, straight on without climbing, to one
+    side. Speeds are shares of the wish, turns are in radians.
+    """
+    shares, when_turned = (1.0, 0.7, 0.4, 0.15), 0.4
+    turns_rad = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
+    rows = [(share, 0.0, height) for share in shares for height in (_AS_WISHED, _LEVEL)]
+    rows += [(0.0, 0.0, _IN_PLACE), *((share, 0.0, _STRAIGHT_ON) for share in shares)]
+    for turn_rad in turns_rad:
+        rows.append((when_turned * math.cos(turn_rad), when_turned * math.sin(turn_rad), _LEVEL))
+    return np.array(rows)
+
+
+_TRIES = _tries()
+_NOWHERE_M = 1e-9  # nearer than this there is no direction [m]
 
 
 @inlined_kernel
@@ -64,8 +110,8 @@ def target_position(arena, i, target):
 @kernel
 def path_length_home_m(arena, i, x):
     """Length [m] of the horizontal way home of UAS i past the tall obstacles."""
-    row, x1, y1, z1 = target_position(arena, i, -1)
-    return route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)[2]
+    row, x1, y1, z1 = target_position(arena, i, HOME)
+    return route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)[2]
 
 
 @inlined_kernel
@@ -80,11 +126,11 @@ def comes_to_rest(arena, state, target):
 
 @inlined_kernel
 def passes_over(obstacle, over, ends, leg, highest_m):
-    """Whether a leg that crosses an obstacle has to pass over it; `over`, `ends`: see `crossing`.
+    """Whether a leg that crosses an obstacle has to pass over it.
 
     Args:
         obstacle: A record of OBSTACLE_DTYPE.
-        over: Whether the leg starts or ends above (or below) the obstacle.
+        over: Whether the leg starts or ends above (or below) the obstacle, see `crossing`.
         ends: Whether it ends in the widened footprint.
         leg: CLEAR, IN_SIGHT, ROUND_CORNER or NO_WAY.
         highest_m: The higher one of the altitudes of both ends [m].
@@ -98,19 +144,18 @@ def passes_over(obstacle, over, ends, leg, highest_m):
 
 @kernel
 def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
-    """Altitude needed over the low obstacles on a leg, and the speed that leaves time to climb.
+    """Altitude [m] needed over the roofs on a leg, and the speed [m/s] that leaves time to climb.
 
-    Returns:
-        (altitude [m], speed [m/s]).
+    -inf where there is no roof.
     """
-    altitude_m = -x[Z]
-    length_m = math.hypot(x1 - x[X], y1 - x[Y])
+    altitude_m = -x[S.Z]
+    length_m = math.hypot(x1 - x[S.X], y1 - x[S.Y])
     needed_m = -math.inf
     speed_mps = arena.uas[i].speed_mps
     ceiling_m = arena.rules[0].ceiling_m
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
-        at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[X], x[Y], x1, y1)
+        at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[S.X], x[S.Y], x1, y1)
         if at > 1.0:
             continue
         roof_m = obstacle.roof_m
@@ -153,42 +198,109 @@ def _brakes_late(arena, i, belief, target, leg):
 
 
 @kernel
+def _passing_speed(arena, i, x, target, distance_m, altitude1_m):
+    """Speed at which a waypoint is flown by, neither past a small sphere nor too high or low."""
+    uas = arena.uas[i]
+    radius_m = arena.waypoints[target].radius_m
+    passing_mps = min(_PASSING_SHARE * uas.speed_mps, _PASSING_PER_S * radius_m)
+    before_m = max(0.0, distance_m - _SLOWED_M)
+    speed_mps = min(uas.speed_mps, passing_mps + _SLOWING_PER_S * before_m)
+    missing_m = abs(altitude1_m + x[S.Z]) - _HEIGHT_SHARE * radius_m
+    if missing_m > 0.0:
+        rate_mps = uas.climb_mps if altitude1_m > -x[S.Z] else uas.descent_mps
+        climbing_s = missing_m / rate_mps + LEAD_S
+        speed_mps = min(speed_mps, _CLIMBING_MPS + distance_m / climbing_s)
+    return speed_mps
+
+
+@kernel
 def _approach_speed(arena, i, x, target, stop, brakes_late, distance_m, leg, altitude1_m):
     """Speed towards the end of a leg [m/s]: slower for turns, a stop, and a climb or descent."""
-    uas = arena.uas[i]
+    most_mps = arena.uas[i].speed_mps
     if brakes_late:
-        return min(uas.speed_mps, _TO_HOME * distance_m / max(arena.rules[0].dt_s, 1.0))
+        return min(most_mps, _TO_HOME * distance_m / max(arena.rules[0].dt_s, 1.0))
     if stop:
-        return min(uas.speed_mps, 0.28 * distance_m)
+        return min(most_mps, _STOPPING_PER_S * distance_m)
     if leg == ROUND_CORNER:
-        return min(uas.speed_mps, 0.65 * uas.speed_mps + 0.25 * distance_m)
-    # flying by: fast, but neither past a small sphere nor before the altitude is reached
-    radius_m = arena.waypoints[target].radius_m
-    passing_mps = min(0.75 * uas.speed_mps, 0.8 * radius_m)
-    speed_mps = min(uas.speed_mps, passing_mps + 0.2 * max(0.0, distance_m - 8.0))
-    missing_m = abs(altitude1_m + x[Z]) - 0.6 * radius_m
-    if missing_m > 0.0:
-        rate_mps = uas.climb_mps if altitude1_m > -x[Z] else uas.descent_mps
-        speed_mps = min(speed_mps, 0.5 + distance_m / (missing_m / rate_mps + LEAD_S))
-    return speed_mps
+        return min(most_mps, _CORNER_SHARE * most_mps + _CORNER_PER_S * distance_m)
+    return _passing_speed(arena, i, x, target, distance_m, altitude1_m)
 
 
 @kernel
 def _altitude(arena, i, x, altitude1_m, way_m, needed_m):
     """Altitude to hold [m]: descend along a glide slope, but stay over what has to be passed."""
     rules = arena.rules[0]
-    glide_m = altitude1_m + _GLIDE_SLOPE * max(0.0, way_m - 15.0)
-    cruise_m = max(-x[Z], rules.floor_m + CRUISE_ALTITUDE_M)
+    glide_m = altitude1_m + _GLIDE_SLOPE * max(0.0, way_m - _GLIDE_ENDS_M)
+    cruise_m = max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M)
     altitude_m = max(altitude1_m, min(cruise_m, glide_m), needed_m)
-    floor_m = lowest_altitude(arena, i, x[X], x[Y])
+    floor_m = lowest_altitude(arena, i, x[S.X], x[S.Y])
     return min(max(altitude_m, floor_m), max(rules.ceiling_m, altitude1_m))
 
 
-@kernel
+@allocating_kernel(forceinline=True)
+def _next_leg(arena, i, x, target, stop, belief):
+    """What is flown next on the way to a target, and how it ends.
+
+    Returns:
+        (north [m], east [m], altitude of the target [m], length of the whole way [m], leg, stop):
+        the target is the place that leads past an overhang, where there is one; the length is 0
+        where the UAS flies low at once.
+    """
+    row, x1, y1, z1 = target_position(arena, i, target)
+    end_x, end_y, way_m, leg = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
+    if leg != CLEAR and arena.rules[0].overhangs:
+        place_m = np.empty(3)
+        first = past_overhangs(arena, i, x[S.X], x[S.Y], x[S.Z], x1, y1, z1, place_m)
+        if first != LEG_TO_TARGET:
+            x1, y1, z1 = place_m[0], place_m[1], place_m[2]
+            end_x, end_y, way_m, leg = x1, y1, 0.0, CLEAR
+            if first == TARGET_IS_PLACE:
+                end_x, end_y, way_m, leg = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
+            stop = True
+    if belief is not None and arena.rules[0].disturbed and target < 0:
+        needed_m, _ = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
+        altitude_m = _altitude(arena, i, x, -z1, way_m, needed_m)
+        low, beside_x, beside_y = low_way(arena, i, x, belief, end_x, end_y, altitude_m, needed_m)
+        if low:
+            way_m = 0.0
+        if beside_x != end_x or beside_y != end_y:
+            end_x, end_y, leg = beside_x, beside_y, ROUND_CORNER
+    if leg == ROUND_CORNER:
+        stop = _is_tight(arena, end_x, end_y)
+    return end_x, end_y, -z1, way_m, leg, stop
+
+
+@rare_kernel
 def _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
     """Whether a command, and braking after it, keeps clear of fence and fixed obstacles."""
     n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m, belief)
     return fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m) >= 0.0
+
+
+@inlined_kernel
+def _write_safe(
+    arena, i, x, reference, north_mps, east_mps, altitude_m, leg, nonlinear, command, path_m, belief
+):
+    """Write the wish, a velocity and an altitude, or the first of `_TRIES` that leaves room."""
+    for k in range(_TRIES.shape[0]):
+        along, aside, height = _TRIES[k]
+        wanted_m = altitude_m
+        if height == _LEVEL:
+            # what is in the way of a descent is not in the way of staying up
+            wanted_m = max(altitude_m, -x[S.Z] - x[S.VZ])
+        elif height == _IN_PLACE and abs(altitude_m + x[S.Z]) <= HEADROOM_M:
+            continue
+        elif height == _STRAIGHT_ON:
+            if leg != CLEAR or not arena.rules[0].overhangs:
+                continue
+            # what is in the way of a climb is not in the way of the straight line
+            wanted_m = -x[S.Z] - x[S.VZ]
+        shown_north_mps = along * north_mps - aside * east_mps
+        shown_east_mps = aside * north_mps + along * east_mps
+        write_command(command, VELOCITY, shown_north_mps, shown_east_mps, wanted_m)
+        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
+            return
+    write_brake(command)
 
 
 @allocating_kernel
@@ -196,11 +308,10 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 
     The wish (fly along the route, in time over low roofs) is flown as far as it leaves room to
-    brake: slower, without descending, up or down in place, to one side, or not at all. On the way
-    home in a wind that it hardly gets ahead against, a UAS flies low.
+    brake. On the way home in a wind that it hardly gets ahead against, a UAS flies low.
 
     Args:
-        arena: The arena.
+        arena: The mission.
         i: Index of the UAS.
         x: (14,) its state.
         reference: (2,) [m/s] of its inner loop.
@@ -210,86 +321,40 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
         command: A record of COMMAND_DTYPE; kind and values are written.
         belief: (N_BELIEF,) of its inner loop; None: in still air.
     """
-    row, x1, y1, z1 = target_position(arena, i, target)
-    end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
-    if leg != CLEAR and arena.rules[0].overhangs:
-        place_m = np.empty(3)
-        first = past_overhangs(arena, i, x[X], x[Y], x[Z], x1, y1, z1, place_m)
-        if first != LEG_TO_TARGET:
-            x1, y1, z1 = place_m[0], place_m[1], place_m[2]
-            end_x, end_y, way_m, leg = x1, y1, 0.0, CLEAR
-            if first == TARGET_IS_PLACE:
-                end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
-            stop = True
-    low = False
-    if belief is not None and arena.rules[0].disturbed and target < 0:
-        needed_m, _ = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
-        altitude_m = _altitude(arena, i, x, -z1, way_m, needed_m)
-        low, beside_x, beside_y = low_way(arena, i, x, belief, end_x, end_y, altitude_m, needed_m)
-        if beside_x != end_x or beside_y != end_y:
-            end_x, end_y, leg = beside_x, beside_y, ROUND_CORNER
-    if leg == ROUND_CORNER:
-        stop = _is_tight(arena, end_x, end_y)
+    end_x, end_y, altitude1_m, way_m, leg, stop = _next_leg(arena, i, x, target, stop, belief)
     lead_s = LEAD_S
     if not stop:
-        # to look beyond what is flown by would turn the UAS round before it gets there
-        left_m = math.hypot(end_x - x[X], end_y - x[Y])
-        lead_s = min(LEAD_S, 0.5 * left_m / (math.hypot(x[VX], x[VY]) + 1e-9))
-    ahead_x = end_x - x[X] - lead_s * x[VX]
-    ahead_y = end_y - x[Y] - lead_s * x[VY]
+        left_m = math.hypot(end_x - x[S.X], end_y - x[S.Y])
+        lead_s = min(LEAD_S, _LEAD_SHARE * left_m / (math.hypot(x[S.VX], x[S.VY]) + _NOWHERE_M))
+    ahead_x = end_x - x[S.X] - lead_s * x[S.VX]
+    ahead_y = end_y - x[S.Y] - lead_s * x[S.VY]
     path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
     brakes_late = _brakes_late(arena, i, belief, target, leg)
     if brakes_late:
         fly_and_brake(arena, i, x, reference, arena.rules[0].brake, nonlinear, path_m, belief)
-        ahead_x, ahead_y = end_x - path_m[-1, X], end_y - path_m[-1, Y]
+        ahead_x, ahead_y = end_x - path_m[-1, S.X], end_y - path_m[-1, S.Y]
     distance_m = math.hypot(ahead_x, ahead_y)
-    needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)
-    approach_mps = _approach_speed(arena, i, x, target, stop, brakes_late, distance_m, leg, -z1)
+    needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, altitude1_m, leg)
+    approach_mps = _approach_speed(
+        arena, i, x, target, stop, brakes_late, distance_m, leg, altitude1_m
+    )
     speed_mps = min(speed_mps, approach_mps)
-    altitude_m = _altitude(arena, i, x, -z1, 0.0 if low else way_m, needed_m)
-    north_mps = 0.0
-    east_mps = 0.0
-    if distance_m > 1e-9:
+    altitude_m = _altitude(arena, i, x, altitude1_m, way_m, needed_m)
+    north_mps, east_mps = 0.0, 0.0
+    if distance_m > _NOWHERE_M:
         north_mps = ahead_x / distance_m * speed_mps
         east_mps = ahead_y / distance_m * speed_mps
-    # what is in the way of a descent is not in the way of staying up
-    level_m = max(altitude_m, -x[Z] - x[VZ])
-    for share in _SHARES_OF_SPEED:
-        for wanted_m in (altitude_m, level_m):
-            write_command(command, VELOCITY, share * north_mps, share * east_mps, wanted_m)
-            if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
-                return
-    if abs(altitude_m + x[Z]) > HEADROOM_M:
-        write_command(command, VELOCITY, 0.0, 0.0, altitude_m)
-        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
-            return
-    if leg == CLEAR and arena.rules[0].overhangs:
-        # what is in the way of a climb is not in the way of the straight line
-        held_m = -x[Z] - x[VZ]
-        for share in _SHARES_OF_SPEED:
-            write_command(command, VELOCITY, share * north_mps, share * east_mps, held_m)
-            if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
-                return
-    for turn in _TURNS:
-        cos = _SHARE_WHEN_TURNED * math.cos(turn)
-        sin = _SHARE_WHEN_TURNED * math.sin(turn)
-        turned_north_mps = cos * north_mps - sin * east_mps
-        turned_east_mps = sin * north_mps + cos * east_mps
-        write_command(command, VELOCITY, turned_north_mps, turned_east_mps, level_m)
-        if _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
-            return
-    write_brake(command)
+    _write_safe(
+        arena, i, x, reference, north_mps, east_mps, altitude_m, leg, nonlinear, command, path_m,
+        belief,
+    )  # fmt: skip
 
 
 @allocating_kernel
 def steer(arena, state, nonlinear, outcome):
     """Resolve commands that name a place into velocities; a UAS called home gets such a command.
 
-    Args:
-        arena: The arena.
-        state: The state.
-        nonlinear: Whether the world flies the 6-DOF plant.
-        outcome: (U,) of OUTCOME_DTYPE; applied_command and returning are written.
+    Of the outcome, applied_command and returning are written.
     """
     for i in range(state.uas.shape[0]):
         if state.uas[i].status != FLYING:
@@ -307,3 +372,37 @@ def steer(arena, state, nonlinear, outcome):
                 arena, i, state.x[i], state.uas[i].reference_mps[:], target, stop, nonlinear,
                 command, state.uas[i].belief[:],
             )  # fmt: skip
+
+
+def velocity_of(
+    arena: Arena, state: WorldState, i: int, command: GoTo, *, nonlinear: bool = False
+) -> Velocity:
+    """The velocity that flies as guidance does in the coming step.
+
+    Args:
+        arena: The mission, of the world or as a planner sees it (`WorldView`).
+        state: The state.
+        i: Index of the UAS, which flies.
+        command: Where to.
+        nonlinear: Whether the world flies the 6-DOF plant.
+
+    Returns:
+        A velocity of the same mode. Where guidance brakes, which it does by vertical speed and not
+        by altitude, its altitude is the one that stops a climb or descent at once.
+    """
+    outcome = np.zeros(len(state.uas), OUTCOME_DTYPE)
+    given = outcome[i]["applied_command"]
+    given["kind"] = GO_TO
+    given["values"][0] = HOME if command.waypoint is None else command.waypoint
+    # return mode would be obeyed instead
+    uas = state.uas.copy()
+    uas["returning"] = False
+    steer(arena, state._replace(uas=uas), nonlinear, outcome)
+    north_mps, east_mps, altitude_m, _ = given["values"].tolist()
+    if given["kind"] != VELOCITY:
+        vehicle = arena.vehicles[i]
+        (_, per_speed), (_, kept) = vehicle["vertical_A"].tolist()
+        way, speed = vehicle["vertical_B"].tolist()
+        stopping_s = per_speed - way / speed * kept
+        altitude_m = -float(state.x[i, S.Z] + stopping_s * state.x[i, S.VZ])
+    return Velocity(north_mps, east_mps, altitude_m, command_mode(command))

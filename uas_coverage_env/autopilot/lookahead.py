@@ -4,27 +4,18 @@ import math
 
 from uas_coverage_env.autopilot.belief import believed_kinematics, believed_wrench
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.kernels import kernel, rare_kernel, stack_array
 from uas_coverage_env.entities.commands import WRENCH
 from uas_coverage_env.entities.state import FLYING, WIND
 from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
 from uas_coverage_env.vehicle import (
     N_INPUTS,
     N_STATES,
-    PHI,
-    THETA,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WY,
-    X,
-    Y,
-    Z,
     fly_kinematics,
     plant_step,
     reseed_reference,
 )
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.contacts import face_between, moving_clearance
 from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart
@@ -36,18 +27,24 @@ PLENTY_M = 2.0
 """More distance to spare than this makes no difference; obstacles farther away are skipped [m]."""
 
 SURPRISE_S = 1.0
-"""What moves may turn: its keep-out is widened by how far it goes in this time [s]."""
+"""What moves may turn: its keep-out is widened by how far it goes in this time [s]. Chosen by hand;
+`benchmarks/safety_filter.py` shows how many UAS are hit."""
 
-_STILL = 0.02
+_STILL_MPS, _STILL_RAD = 0.02, 0.004
+"""A UAS stands when its speed is less, its tilt nearer to that of a hover, and its rates
+[rad/s] are less: what is left of the motion is centimetres."""
+
+_CREEPING_MPS = 0.1
+"""A UAS that is no faster at the end of a prediction is taken to stand, too."""
 
 
 @kernel
 def _is_still(x, roll_rad, pitch_rad):
-    """Slow and as level as in a hover, so that what is left of the motion is centimetres."""
+    """Slow and as level as in a hover."""
     return (
-        abs(x[VX]) + abs(x[VY]) + abs(x[VZ]) < _STILL
-        and abs(x[PHI] - roll_rad) + abs(x[THETA] - pitch_rad) < 0.2 * _STILL
-        and abs(x[WX]) + abs(x[WY]) < 0.2 * _STILL
+        abs(x[S.VX]) + abs(x[S.VY]) + abs(x[S.VZ]) < _STILL_MPS
+        and abs(x[S.PHI] - roll_rad) + abs(x[S.THETA] - pitch_rad) < _STILL_RAD
+        and abs(x[S.WX]) + abs(x[S.WY]) < _STILL_RAD
     )
 
 
@@ -69,16 +66,7 @@ def _fly_as_believed(vehicle, belief, x, governed, command, nonlinear, u):
 
 @kernel
 def fly_kinematically(vehicle, x, governed, command, u, belief=None):
-    """Fly a command for a step, by the linear model without the battery.
-
-    Args:
-        vehicle: Record of VEHICLE_DTYPE.
-        x: (14,) state, written.
-        governed: (2,) [m/s] reference of the inner loop, written.
-        command: A record of COMMAND_DTYPE, of any kind but GO_TO.
-        u: (5,) inputs, written.
-        belief: (N_BELIEF,) of the inner loop; None: in still air.
-    """
+    """Fly a command for a step, by the linear model without the battery."""
     if belief is None:
         command_wrench(vehicle, x, governed, command, u)
         fly_kinematics(vehicle, x, u)
@@ -86,34 +74,22 @@ def fly_kinematically(vehicle, x, governed, command, u, belief=None):
         _fly_as_believed(vehicle, belief, x, governed, command, False, u)
 
 
-@inlined_kernel
-def fly_and_brake(arena, i, start, reference, command, nonlinear, path_m, belief=None):
-    """Simulate a command for one step, then braking until the UAS stands.
+@rare_kernel
+def fly_and_brake(
+    arena, i, start, reference, command, nonlinear, path_m, belief=None, n_held=1
+):  # fmt: skip
+    """Simulate a command for one step, or n_held, then braking until the UAS stands.
 
     The simulation is the inner loop and the dynamics that the world flies. So where a command was
     found safe, its braking flight is still there to be flown in the next step: from a safe state
     there is always a safe command (against what stands still).
 
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        start: (14,) its state.
-        reference: (2,) [m/s] of its inner loop; neither is changed.
-        command: A record of COMMAND_DTYPE, of any kind but GO_TO.
-        nonlinear: Whether the world flies the 6-DOF plant, and this too.
-        path_m: (N+1, 3) [m] positions, written; after a stop the position stays.
-        belief: (N_BELIEF,) of its inner loop; None: in still air.
+    Nothing but `path_m` is written; after a stop the position stays.
 
     Returns:
         (steps until it stands, slack [m]): the slack is PLENTY_M, but negative where the UAS has
         not come to rest at the end of the path.
     """
-    return fly_hold_and_brake(arena, i, start, reference, command, 1, nonlinear, path_m, belief)
-
-
-@inlined_kernel
-def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, path_m, belief=None):
-    """Like `fly_and_brake`, with the command flown for n_held steps."""
     n_steps = path_m.shape[0] - 1
     vehicle = arena.vehicles[i]
     x = stack_array(N_STATES)
@@ -125,9 +101,8 @@ def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, p
         governed[k] = reference[k]
     for k in range(N_INPUTS):
         u[k] = 0.0
-    path_m[0, 0] = x[X]
-    path_m[0, 1] = x[Y]
-    path_m[0, 2] = x[Z]
+    for axis in range(3):
+        path_m[0, axis] = x[S.X + axis]
     roll_rad, pitch_rad = 0.0, 0.0
     if belief is not None and arena.rules[0].disturbed:
         # a hover leans into the wind
@@ -146,17 +121,15 @@ def fly_hold_and_brake(arena, i, start, reference, command, n_held, nonlinear, p
                 fly_kinematics(vehicle, x, u)
         if k < n_held and command.kind == WRENCH:
             reseed_reference(vehicle, x, governed)
-        path_m[k + 1, 0] = x[X]
-        path_m[k + 1, 1] = x[Y]
-        path_m[k + 1, 2] = x[Z]
+        for axis in range(3):
+            path_m[k + 1, axis] = x[S.X + axis]
         if k + 1 >= n_held and _is_still(x, roll_rad, pitch_rad):
             for later in range(k + 2, n_steps + 1):
-                path_m[later, 0] = x[X]
-                path_m[later, 1] = x[Y]
-                path_m[later, 2] = x[Z]
+                for axis in range(3):
+                    path_m[later, axis] = x[S.X + axis]
             return k + 1, PLENTY_M
-    speed_mps = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY] + x[VZ] * x[VZ])
-    return n_steps, min(PLENTY_M, 0.1 - speed_mps)
+    speed_mps = math.sqrt(x[S.VX] * x[S.VX] + x[S.VY] * x[S.VY] + x[S.VZ] * x[S.VZ])
+    return n_steps, min(PLENTY_M, _CREEPING_MPS - speed_mps)
 
 
 @kernel
@@ -217,17 +190,12 @@ def _height_slack(arena, i, path_m, n_flown, slack_m):
     return slack_m
 
 
-@inlined_kernel
+@rare_kernel
 def fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m):
     """Least distance to spare from geofence, fixed obstacles and least height along a path.
 
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        path_m: (N+1, 3) [m] its path.
-        n_flown: Number of segments in which it moves.
-        enough_m: Stop looking when the slack is below this [m].
-        slack_m: Slack known so far [m].
+    `enough_m`: where the slack is below this, nothing more is looked at. `slack_m`: what is known
+    so far; `n_flown`: in so many segments the UAS moves.
 
     Returns:
         The smaller of slack_m and the distance to spare [m]: beyond the tube, which grows along the
@@ -280,19 +248,11 @@ def required_from(arena, step, i, m):
     return required_m + SURPRISE_S * speed_mps
 
 
-@inlined_kernel
+@rare_kernel
 def moving_slack(arena, step, i, path_m, enough_m, slack_m):
     """Least distance to spare from moving obstacles that keep their present velocities.
 
     What moves may also turn without warning: see `required_from`.
-
-    Args:
-        arena: The arena.
-        step: Number of the sample at which the path begins.
-        i: Index of the UAS.
-        path_m: (N+1, 3) [m] its path.
-        enough_m: As in `fixed_slack`.
-        slack_m: Slack known so far [m].
 
     Returns:
         The smaller of slack_m and the distance to spare [m].
@@ -357,18 +317,9 @@ def separation_at(path_m, other_m, k):
     )
 
 
-@inlined_kernel
+@rare_kernel
 def peer_slack(arena, uas, i, path_m, committed_m, enough_m, slack_m):
     """Least distance to spare from the paths to which the other UAS are committed.
-
-    Args:
-        arena: The arena.
-        uas: `WorldState.uas`.
-        i: Index of the UAS.
-        path_m: (N+1, 3) [m] its path.
-        committed_m: (U, N+1, 3) [m] the paths of all UAS.
-        enough_m: As in `fixed_slack`.
-        slack_m: Slack known so far [m].
 
     Returns:
         The smaller of slack_m and the distance to spare [m].
@@ -391,4 +342,31 @@ def peer_slack(arena, uas, i, path_m, committed_m, enough_m, slack_m):
             slack_m = min(slack_m, apart_m - required_m)
             if slack_m < enough_m:
                 return slack_m
+    return slack_m
+
+
+@kernel
+def braking_slack(
+    arena, state, i, command, nonlinear, enough_m, path_m, committed_m, moving=True
+):  # fmt: skip
+    """Least distance to spare when a command is flown and then braked [m].
+
+    From all that stands still or brakes, and if `moving` from what moves, too.
+    """
+    n_flown, slack_m = fly_and_brake(
+        arena,
+        i,
+        state.x[i],
+        state.uas[i].reference_mps[:],
+        command,
+        nonlinear,
+        path_m,
+        state.uas[i].belief[:],
+    )
+    if slack_m >= enough_m:
+        slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
+    if moving and slack_m >= enough_m:
+        slack_m = moving_slack(arena, state.step[0], i, path_m, enough_m, slack_m)
+    if slack_m >= enough_m:
+        slack_m = peer_slack(arena, state.uas["status"], i, path_m, committed_m, enough_m, slack_m)
     return slack_m

@@ -1,12 +1,16 @@
-"""When a UAS has to turn home to arrive in time and with charge left."""
+"""When a UAS has to turn home to arrive in time and with charge left.
+
+Constants were chosen by hand; `benchmarks/return_mode.py` shows how many UAS are lost with them, in
+still air and in wind (`--level`), and `benchmarks/returns.py` how much they keep.
+"""
 
 import math
 
 from uas_coverage_env.autopilot.guidance import path_length_home_m
-from uas_coverage_env.autopilot.way_home import flight_home, latest_flight_home
+from uas_coverage_env.autopilot.return_path import flight_home, latest_flight_home
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.entities.state import CONSUMPTION, FLYING, WIND
-from uas_coverage_env.vehicle import DOD, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import SpeedLimits, TravelTimeModel, flight_seconds
 from uas_coverage_env.world.coverage import can_cover
 
@@ -15,16 +19,18 @@ RETURN_MODE = TravelTimeModel(speed_share=2.0 / 3.0, in_turn=True, landing_s=12.
 `benchmarks/returns.py` shows what it costs. Recorded flights and trained policies depend on it."""
 
 _CLOCK_RESERVE_S = 30.0
+"""Left of the mission when a UAS has landed [s]."""
 
 _STEPS_LATER = 3.0
 """What a step takes from what is left of the way home, in steps: the step itself, a step farther
 away at full speed, and half a turn more."""
 
 _FAR_FROM_EMPTY, _FAR_FROM_EMPTY_S = 2.0, 120.0
-"""With so many times the way home left, and so many seconds, nothing more is looked at."""
+"""With so many times the way home left [-], and so many seconds, nothing more is looked at."""
 
 _TOO_STRONG = 0.88
-"""Of the highest airspeed: a UAS leaves a wind against which it soon could not hold its place."""
+"""Of the highest airspeed: a UAS leaves a wind against which it soon could not hold its place [-].
+"""
 
 _STEADY, _UNSTEADY_S = 2.0, 20.0
 """Over home a UAS waits for a moment in which it is near and slow enough to land, or for others to
@@ -32,14 +38,15 @@ land first. Where its tube is wider than so many landing distances, charge for s
 kept for each of them that it is wider."""
 
 _AMPLE, _AMPLE_S = 2.0, 60.0
-"""With so many times the way home left, and so many seconds, what called a UAS home was a gust."""
+"""With so many times the way home left [-], and so many seconds, what called a UAS home was a gust.
+"""
 
 
 @kernel
 def seconds_home(arena, i, x):
     """Time [s] that UAS i is given to fly home and land, held up by others (`RETURN_MODE`)."""
     uas = arena.uas[i]
-    altitude_m = max(-x[Z] + uas.home_m[2], 0.0)
+    altitude_m = max(-x[S.Z] + uas.home_m[2], 0.0)
     speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
     way_m = path_length_home_m(arena, i, x)
     return flight_seconds(RETURN_MODE, speeds, 0.0, way_m, 0.0, altitude_m)
@@ -54,7 +61,7 @@ def seconds_to_keep(arena, i, x, left_s, belief=None):
     to rest after one more step (`latest_flight_home`), looked at only where little is left.
 
     Args:
-        arena: The arena.
+        arena: The mission.
         i: Index of the UAS.
         x: (14,) its state.
         left_s: What battery and clock leave [s].
@@ -94,7 +101,7 @@ def _calls_home(arena, state, i, share, more_s):
     time_left_s = (rules.max_steps - state.step[0]) * rules.dt_s
     if home_s + _CLOCK_RESERVE_S - RETURN_MODE.landing_s > time_left_s:
         return True
-    if x[DOD] + home_s * uas.dod_per_s >= uas.dod_max:
+    if x[S.DOD] + home_s * uas.dod_per_s >= uas.dod_max:
         return True
     belief = state.uas[i].belief[:]
     if rules.disturbed:
@@ -103,7 +110,7 @@ def _calls_home(arena, state, i, share, more_s):
             return True
     # never less than the model says: what is saved now may be needed on the way
     per_s = uas.dod_per_s * (1.0 + max(belief[CONSUMPTION], 0.0))
-    left_s = min(time_left_s, (uas.dod_max - x[DOD]) / per_s - _waiting_s(arena, i))
+    left_s = min(time_left_s, (uas.dod_max - x[S.DOD]) / per_s - _waiting_s(arena, i))
     return share * seconds_to_keep(arena, i, x, left_s, belief) + more_s >= left_s
 
 
@@ -122,12 +129,6 @@ def call_home(arena, state, nonlinear, outcome):
 
     In wind, home may be out of reach for as long as a gust blows, or as long as a UAS is high up.
     It goes back to work when that is over, if charge and time are ample.
-
-    Args:
-        arena: The arena.
-        state: The state; returning is written.
-        nonlinear: Not asked for: all assistants are called with the same arguments.
-        outcome: Likewise.
     """
     for i in range(state.uas.shape[0]):
         if state.uas[i].status != FLYING:

@@ -9,12 +9,13 @@ gives up its room for braking because of it.
 """
 
 from uas_coverage_env.autopilot.evasion import LINGERING
-from uas_coverage_env.autopilot.lookahead import fly_hold_and_brake, separation_at
+from uas_coverage_env.autopilot.lookahead import fly_and_brake, separation_at
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.entities.state import FLYING
 
 CLAIMED_S = 5.0
-"""For how long a UAS on its way home claims to go on as it wishes now [s]; then it brakes."""
+"""For how long a UAS on its way home claims to go on as it wishes now [s]; then it brakes. Chosen
+by hand; `benchmarks/right_of_way.py` shows which UAS come home."""
 
 ELBOW_ROOM_M = 1.0
 """What claimed ways are kept clear of, beyond the distance that counts as a breach [m]: the next
@@ -25,10 +26,7 @@ command home is not quite the one that was claimed."""
 def decision_order(state, order):
     """The order in which UAS decide.
 
-    Args:
-        state: The state.
-        order: (U,) written: the indices of the flying UAS, those in return mode
-            first.
+    Written to `order` (U,): the indices of the flying UAS, those in return mode first.
 
     Returns:
         (flying, returning): how many they are.
@@ -50,31 +48,16 @@ def decision_order(state, order):
 def claim_way(arena, state, i, command, nonlinear, claim_m):
     """Write the way (N+1, 3) [m] that UAS i would fly now if no other UAS were there."""
     n_held = max(1, round(CLAIMED_S / arena.rules[0].dt_s))
-    x = state.x[i]
-    fly_hold_and_brake(
-        arena,
-        i,
-        x,
-        state.uas[i].reference_mps[:],
-        command,
-        n_held,
-        nonlinear,
-        claim_m,
-        state.uas[i].belief[:],
-    )
+    x, reference, belief = state.x[i], state.uas[i].reference_mps[:], state.uas[i].belief[:]
+    fly_and_brake(arena, i, x, reference, command, nonlinear, claim_m, belief, n_held)
 
 
 @kernel
 def room_beside(arena, i, path_m, claimants, n_claims, claims_m):
     """How well a path keeps clear of the claimed ways, flown at the same time [m].
 
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        path_m: (N+1, 3) [m] its path.
-        claimants: (U,) indices of UAS.
-        n_claims: For how many of the first of these room is to be made.
-        claims_m: (U, N+1, 3) [m] the claimed ways, by the index of the UAS.
+    Room is to be made for the first n_claims of the claimants (U,), whose ways are claims_m
+    (U, N+1, 3), by the index of the UAS.
 
     Returns:
         The least room to spare along the path, at most ELBOW_ROOM_M; where it is negative, less a

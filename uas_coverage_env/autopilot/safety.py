@@ -20,24 +20,24 @@ from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.evasion import evade
 from uas_coverage_env.autopilot.lookahead import (
     TOLERANCE_M,
-    fixed_slack,
+    braking_slack,
     fly_and_brake,
-    moving_slack,
-    peer_slack,
 )
 from uas_coverage_env.autopilot.right_of_way import claim_way, decision_order, room_beside
 from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
-from uas_coverage_env.entities.commands import ACCELERATION, CLIMB, VELOCITY
-from uas_coverage_env.vehicle import TAU_Z, VX, VY, Z
+from uas_coverage_env.entities.commands import ACCELERATION, CLIMB, N_VALUES, VELOCITY
+from uas_coverage_env.vehicle import layout as S
 
-_LEAST_SPEED_MPS = 3.0
+_LEAST_SPEED_MPS = 3.0  # deflections of a slower wish are as fast; chosen by hand
 _AS_WISHED, _CLIMBING, _SINKING, _LEVEL = range(4)
 _TURN_RAD, _SPEED_SHARE, _HEIGHT = range(3)
-_NOTICEABLE_M = 1e-3
+_NOTICEABLE_M = 1e-3  # less room to claims makes no difference
 
 
 def _deflections() -> np.ndarray:
     """(D, 3) columns `_TURN_RAD`, `_SPEED_SHARE` and one of the four heights: nearest first.
+
+    How near is chosen by hand: a turn by 60°, five sixths of the speed and two heights count alike.
 
     Instead of braking, last, come level flight, straight up or down, and creeping: a UAS wedged in
     between others may have room for no more.
@@ -64,28 +64,6 @@ _DEFLECTIONS = _deflections()
 
 
 @kernel
-def _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m):
-    """Least distance to spare from everything when a command is flown and then braked [m]."""
-    n_flown, slack_m = fly_and_brake(
-        arena,
-        i,
-        state.x[i],
-        state.uas[i].reference_mps[:],
-        command,
-        nonlinear,
-        path_m,
-        state.uas[i].belief[:],
-    )
-    if slack_m >= enough_m:
-        slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
-    if slack_m >= enough_m:
-        slack_m = moving_slack(arena, state.step[0], i, path_m, enough_m, slack_m)
-    if slack_m >= enough_m:
-        slack_m = peer_slack(arena, state.uas, i, path_m, committed_m, enough_m, slack_m)
-    return slack_m
-
-
-@kernel
 def _wish(arena, state, i, command):
     """The velocity (north, east, down) [m/s] that a command is after."""
     uas = arena.uas[i]
@@ -93,7 +71,7 @@ def _wish(arena, state, i, command):
     kind = command.kind
     values = command.values
     if kind == VELOCITY:
-        down_mps = -values[2] - x[Z]
+        down_mps = -values[2] - x[S.Z]
         return values[0], values[1], min(max(down_mps, -uas.climb_mps), uas.descent_mps)
     if kind == CLIMB:
         return values[0], values[1], values[2]
@@ -102,7 +80,7 @@ def _wish(arena, state, i, command):
         north_mps = state.uas[i].reference_mps[0] + values[0] * dt_s
         east_mps = state.uas[i].reference_mps[1] + values[1] * dt_s
         return north_mps, east_mps, 0.0
-    return x[VX], x[VY], 0.0
+    return x[S.VX], x[S.VY], 0.0
 
 
 @kernel
@@ -137,11 +115,13 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     wish_mps = _wish(arena, state, i, command)
     for d in range(n_deflections):
         _deflect(arena, i, wish_mps, d, command)
-        slack_m = _slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
+        slack_m = braking_slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
         if slack_m >= 0.0:
             return
     write_brake(command)
-    best_m = _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
+    best_m = braking_slack(
+        arena, state, i, command, nonlinear, -math.inf, path_m, committed_m, True
+    )
     if best_m >= -TOLERANCE_M:
         return
     heading_rad = math.atan2(wish_mps[1], wish_mps[0])
@@ -150,7 +130,9 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     best = -1
     for d in range(n_deflections):
         _deflect(arena, i, wish_mps, d, command)
-        slack_m = _slack(arena, state, i, command, nonlinear, best_m, path_m, committed_m)
+        slack_m = braking_slack(
+            arena, state, i, command, nonlinear, best_m, path_m, committed_m, True
+        )
         if slack_m > best_m:
             best_m = slack_m
             best = d
@@ -158,7 +140,7 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
         write_brake(command)
     else:
         _deflect(arena, i, wish_mps, best, command)
-    _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
+    braking_slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
 
 
 @kernel
@@ -175,7 +157,7 @@ def _make_way(
     """
     n_deflections = _DEFLECTIONS.shape[0]
     own_kind = command.kind
-    own = command.values[0], command.values[1], command.values[2], command.values[TAU_Z]
+    own = command.values[0], command.values[1], command.values[2], command.values[N_VALUES - 1]
     wish_mps = _wish(arena, state, i, command)
     n_options = n_deflections + 2
     best, best_m = n_options, -math.inf
@@ -186,7 +168,10 @@ def _make_way(
         elif option > n_deflections:
             write_brake(command)
             enough_m = -TOLERANCE_M
-        if _slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m) < enough_m:
+        if (
+            braking_slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m)
+            < enough_m
+        ):
             continue
         room_m = room_beside(arena, i, path_m, claimants, n_claims, claims_m)
         if room_m > best_m + _NOTICEABLE_M:
@@ -199,21 +184,14 @@ def _make_way(
         write_brake(command)
     else:
         write_command(command, own_kind, own[0], own[1], own[2])
-        command.values[TAU_Z] = own[TAU_Z]
-    _slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
+        command.values[N_VALUES - 1] = own[N_VALUES - 1]
+    braking_slack(arena, state, i, command, nonlinear, -math.inf, path_m, committed_m)
     return best < n_options
 
 
 @allocating_kernel
 def filter_commands(arena, state, nonlinear, outcome):
-    """Replace the unsafe ones among the commands in `outcome` and mark them as filtered.
-
-    Args:
-        arena: The arena.
-        state: The state from which the commands are flown; filtered is written.
-        nonlinear: Whether the world flies the 6-DOF plant.
-        outcome: (U,) of OUTCOME_DTYPE; applied_command and filtered are written.
-    """
+    """Replace the unsafe ones among the commands in `outcome` and mark them as filtered."""
     n_uas = state.uas.shape[0]
     n_steps = arena.rules[0].lookahead_steps
     committed_m = np.empty((n_uas, n_steps + 1, 3))
@@ -238,7 +216,7 @@ def filter_commands(arena, state, nonlinear, outcome):
         command = outcome[i].applied_command
         path_m = committed_m[i]
         claimants, n_claims = order, n_returning
-        slack_m = _slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
+        slack_m = braking_slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
         if rank < n_returning:
             claimants, n_claims = held_up, n_held_up
             claim_way(arena, state, i, command, nonlinear, claims_m[i])

@@ -21,7 +21,9 @@ KIND_NAMES = tuple(kind.name.lower().replace("_", "") for kind in CommandKind)
 HOME = -1
 """The GO_TO index of a UAS's own start."""
 
-COMMAND_DTYPE = record_dtype([("kind", "i8"), ("values", "f8", (4,)), ("returning", "?")])
+N_VALUES = 4
+
+COMMAND_DTYPE = record_dtype([("kind", "i8"), ("values", "f8", (N_VALUES,)), ("returning", "?")])
 """One command: its kind, up to four numbers in the order of the dataclass, whether it returns."""
 
 _MODES = get_args(Mode)
@@ -143,7 +145,7 @@ def pack(
         elif name in active:
             raise ValueError(f"{name} has no command; give one for each active UAS")
         else:
-            rows.append((VELOCITY, (0.0, 0.0, 0.0, 0.0), False))
+            rows.append((VELOCITY, (0.0,) * N_VALUES, False))
     return np.array(rows, dtype=COMMAND_DTYPE)
 
 
@@ -174,7 +176,7 @@ def _row(name: str, command: Any, n_waypoints: int) -> tuple[int, tuple[float, .
     values = tuple(
         _number(name, field, getattr(command, field)) for field in _NUMBERS[type(command)]
     )
-    return kind, values + (0.0,) * (4 - len(values)), returning
+    return kind, values + (0.0,) * (N_VALUES - len(values)), returning
 
 
 def _number(name: str, field: str, value: Any) -> float:

@@ -17,11 +17,11 @@ from uas_coverage_env.flight.rollout import recorded_versions
 from uas_coverage_env.operations.corners import distances_m
 from uas_coverage_env.operations.flown_battery import Battery, battery_of, unused
 from uas_coverage_env.operations.flown_way import Way, way_of
+from uas_coverage_env.operations.flown_world import FlownWorld, Moments
 from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.logs import Logged
 from uas_coverage_env.operations.logs.flights import chosen_flight
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation.flown import FlownWorld, Moments
 from uas_coverage_env.vehicle import DOD, N_STATES, PHI, VX, tilts_and_turn
 
 PLANNER = "log"

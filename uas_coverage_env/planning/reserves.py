@@ -18,7 +18,7 @@ TOUR = TravelTimeModel(landing_s=3.0)
 `benchmarks/tour.py` sets the times of its orders beside those that are flown."""
 
 BY_LEGS = TravelTimeModel(landing_s=12.0)
-"""Of `LegMission`: `ROUTED`, and the landing of return mode. Chosen by hand;
+"""Of `LegMission`: `ROUTED`, and as long a landing as return mode's. Chosen by hand;
 `benchmarks/flown_by.py` sets promised times beside those of the files."""
 
 TRAJECTORY = TravelTimeModel(landing_s=4.0)
@@ -68,7 +68,7 @@ anew for a delay."""
 
 TRAJECTORY_RESERVE = Reserve(kept_s=6.0)
 """Of the routes of `trajectory` and `learned-route`, whose flights keep a backup besides. Chosen by
-hand; `benchmarks/trajectory.py` shows what charge is left."""
+hand; `benchmarks/trajectory.py` shows what harm is done."""
 
 ORDER_GUIDE_RESERVE = Reserve(kept_s=25.0)
 """Of the order that `milp-mpc-guided` follows, somewhat more than `MILP_RESERVE` and `BRAKING_S`

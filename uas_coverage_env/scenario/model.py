@@ -61,36 +61,37 @@ class Scenario(UncheckedScenario):
             raise ValueError(first_of(found))
         return self
 
-    def moving_positions(self, time_s: float) -> NDArray[np.float64]:
-        """Centres of the moving obstacles at a time, integrated exactly.
+    def moving_positions(self, time_s: float | NDArray[np.float64]) -> NDArray[np.float64]:
+        """Centres of the moving obstacles, integrated exactly.
 
         Args:
-            time_s: Time since the start of the mission; not negative [s].
+            time_s: Time since the start of the mission, or (T,) times; not negative [s].
 
         Returns:
-            (M, 3) [m].
+            (M, 3) or (T, M, 3) [m].
         """
-        positions = np.empty((len(self.moving_obstacles), 3))
-        for position, obstacle, (from_s, velocity_mps) in zip(
-            positions, self.moving_obstacles, self._schedules, strict=True
-        ):
+        time_s = np.asarray(time_s, dtype=float)
+        positions = np.empty((*time_s.shape, len(self.moving_obstacles), 3))
+        for m, (from_s, velocity_mps) in enumerate(self._schedules):
             until_s = np.append(from_s[1:], np.inf)
-            flown_s = np.clip(np.minimum(time_s, until_s) - from_s, 0.0, None)
-            position[:] = obstacle.start_m + flown_s @ velocity_mps
+            flown_s = np.clip(np.minimum(time_s[..., None], until_s) - from_s, 0.0, None)
+            way_m = (flown_s[..., None, :] @ velocity_mps)[..., 0, :]
+            positions[..., m, :] = self.moving_obstacles[m].start_m + way_m
         return positions
 
-    def moving_velocities(self, time_s: float) -> NDArray[np.float64]:
+    def moving_velocities(self, time_s: float | NDArray[np.float64]) -> NDArray[np.float64]:
         """Velocities of the moving obstacles; at a change, the new one.
 
         Args:
-            time_s: Time since the start of the mission; not negative [s].
+            time_s: Time since the start of the mission, or (T,) times; not negative [s].
 
         Returns:
-            (M, 3) [m/s].
+            (M, 3) or (T, M, 3) [m/s].
         """
-        velocities = np.empty((len(self.moving_obstacles), 3))
-        for velocity, (from_s, velocity_mps) in zip(velocities, self._schedules, strict=True):
-            velocity[:] = velocity_mps[np.searchsorted(from_s, time_s, side="right") - 1]
+        velocities = np.empty((*np.shape(time_s), len(self.moving_obstacles), 3))
+        for m, (from_s, velocity_mps) in enumerate(self._schedules):
+            now = np.searchsorted(from_s, time_s, side="right") - 1
+            velocities[..., m, :] = velocity_mps[now]
         return velocities
 
     @cached_property

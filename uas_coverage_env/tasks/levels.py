@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from uas_coverage_env.scenario import Family, Scenario
 from uas_coverage_env.features.motor import MotorDegraded
 from uas_coverage_env.features.radio import RadioLost
+from uas_coverage_env.scenario import Family, Scenario
 from uas_coverage_env.scenario.families import BUILT_IN
 from uas_coverage_env.tasks.task import Task
 

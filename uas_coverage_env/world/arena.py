@@ -250,16 +250,8 @@ def _vehicles(scenario: Scenario) -> NDArray[np.void]:
 def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions [m] and velocities [m/s] of the moving obstacles at every sample, (T+1, M, 3)."""
     n_samples = scenario.max_steps + SAMPLES_AFTER_END + 1
-    path_m = np.zeros((n_samples, len(scenario.moving_obstacles), 3))
-    velocity_mps = np.zeros_like(path_m)
-    pieces = [piece for each in scenario.moving_obstacles for piece in each.schedule]
-    if not any(any(piece.velocity_mps) for piece in pieces):  # as planners see it before take-off
-        path_m[:] = scenario.moving_positions(0.0)
-    else:
-        for k in range(n_samples):
-            path_m[k] = scenario.moving_positions(k * scenario.dt_s)
-            velocity_mps[k] = scenario.moving_velocities(k * scenario.dt_s)
-    return path_m, velocity_mps
+    time_s = scenario.dt_s * np.arange(n_samples, dtype=np.float64)
+    return scenario.moving_positions(time_s), scenario.moving_velocities(time_s)
 
 
 def _uas(scenario: Scenario) -> NDArray[np.void]:

@@ -65,23 +65,20 @@ def obstacle_columns(obstacles: NDArray[np.void]) -> NDArray[np.float64]:
 
 
 @inlined_kernel
+def halves_away(low, high, middle, per_half):
+    """How far a range is from the middle of a box's side, over half of that side."""
+    return max(low - middle, middle - high) * per_half
+
+
+@inlined_kernel
 def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
     """Lower bounds of the clearance of a segment from some obstacles, by the boxes around both.
 
     The distance D is convex. From the middle of an obstacle's box to its walls, where it is
     near_m, it has risen by rise_m; farther out it rises at least as fast.
 
-    Args:
-        columns: (N_COLUMNS, C).
-        first: Index of the first obstacle.
-        n: Number of columns, at most BLOCK.
-        x0: Start of the segment, north [m]; then east, down, and its end.
-        y0: See x0.
-        z0: See x0.
-        x1: See x0.
-        y1: See x0.
-        z1: See x0.
-        bound_m: (n or more,) [m] written; -inf where the boxes meet.
+    Of the n columns from `first` on, at most BLOCK: written to `bound_m`, -inf where the boxes
+    meet.
     """
     x_low, x_high = min(x0, x1), max(x0, x1)
     y_low, y_high = min(y0, y1), max(y0, y1)
@@ -95,9 +92,9 @@ def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
     near_m = columns[NEAR, first : first + n]
     rise_m = columns[RISE, first : first + n]
     for o in range(n):
-        times = max(0.0, max(x_low - middle_x[o], middle_x[o] - x_high) * per_half_x[o])
-        times = max(times, max(y_low - middle_y[o], middle_y[o] - y_high) * per_half_y[o])
-        times = max(times, max(z_low - middle_z[o], middle_z[o] - z_high) * per_half_z[o])
+        times = max(0.0, halves_away(x_low, x_high, middle_x[o], per_half_x[o]))
+        times = max(times, halves_away(y_low, y_high, middle_y[o], per_half_y[o]))
+        times = max(times, halves_away(z_low, z_high, middle_z[o], per_half_z[o]))
         far_m = near_m[o] + rise_m[o] * (times - 1.0) - EPS_M
         bound_m[o] = far_m if times > 1.0 else -math.inf
 

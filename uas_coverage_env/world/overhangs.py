@@ -6,7 +6,7 @@ import numpy as np
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.world.routes import obstructs
+from uas_coverage_env.world.routes import level_apart, obstructs
 
 _ROOM_BELOW_M = 0.5
 _UPRIGHT = 1e-6
@@ -30,15 +30,7 @@ def overhangs(hull: ConvexPolytope, ground_m: float) -> bool:
 @kernel
 def _hangs_over(arena, obstacle, x, y, z):
     """Whether the way straight up from a place to the roof of an obstacle meets the obstacle."""
-    lower, upper = obstacle.lower_m, obstacle.upper_m
-    if (
-        not obstacle.overhangs
-        or x < lower[0]
-        or x > upper[0]
-        or y < lower[1]
-        or y > upper[1]
-        or -z >= obstacle.roof_m
-    ):
+    if not obstacle.overhangs or level_apart(obstacle, x, y, x, y) or -z >= obstacle.roof_m:
         return False
     up_m = -obstacle.roof_m - _ABOVE_ROOF_M
     return obstructs(obstacle, arena.normals, arena.offsets_m, x, y, z, x, y, up_m)
@@ -46,14 +38,7 @@ def _hangs_over(arena, obstacle, x, y, z):
 
 @kernel
 def is_below_overhang(arena, x, y, z):
-    """Whether a UAS at a place cannot climb over some obstacle, as that is above it itself.
-
-    Args:
-        arena: The arena.
-        x: North [m].
-        y: East [m].
-        z: Down [m].
-    """
+    """Whether a UAS at a place cannot climb over some obstacle, as that is above it itself."""
     if arena.rules[0].overhangs:
         for o in range(arena.obstacles.shape[0]):
             if _hangs_over(arena, arena.obstacles[o], x, y, z):

@@ -10,7 +10,7 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_arra
 from uas_coverage_env.geometry import segment_meets, signed_distance
 from uas_coverage_env.world.broad_phase import BLOCK, BOX, write_meetings
 
-_CREEP_M = 1e-3
+CREEP_M = 1e-3
 
 CLEAR, IN_SIGHT, ROUND_CORNER, NO_WAY = range(4)
 """A leg to the target itself, free; to the target, over low obstacles; to a corner; to the target,
@@ -82,9 +82,9 @@ def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
     over = min(d0, d1) <= -obstacle.wall_m
     inflation_m = 0.0
     if d0 > -obstacle.wall_m:
-        inflation_m = min(inflation_m, d0 - _CREEP_M)
+        inflation_m = min(inflation_m, d0 - CREEP_M)
     if d1 > -obstacle.wall_m:
-        inflation_m = min(inflation_m, d1 - _CREEP_M)
+        inflation_m = min(inflation_m, d1 - CREEP_M)
     at = _entry(normals, offsets_m, first, last, inflation_m, x0, y0, x1, y1)
     return at, over, d1 <= 0.0
 
@@ -110,8 +110,8 @@ def obstructs(obstacle, normals, offsets_m, x0, y0, z0, x1, y1, z1):
     last = obstacle.last_kept
     keep_m = min(
         obstacle.wall_m,
-        signed_distance(normals, offsets_m, first, last, x0, y0, z0) - _CREEP_M,
-        signed_distance(normals, offsets_m, first, last, x1, y1, z1) - _CREEP_M,
+        signed_distance(normals, offsets_m, first, last, x0, y0, z0) - CREEP_M,
+        signed_distance(normals, offsets_m, first, last, x1, y1, z1) - CREEP_M,
     )
     return segment_meets(normals, offsets_m, first, last, keep_m, x0, y0, z0, x1, y1, z1)
 
@@ -177,7 +177,7 @@ def route(arena, target, x0, y0, z0, x1, y1, z1):
     """The next leg on the shortest way to a target past the fixed obstacles.
 
     Args:
-        arena: The arena.
+        arena: The mission.
         target: Row of `node_distance_m`: a waypoint, or W + the UAS for its start.
         x0: North of the UAS [m].
         y0: East of the UAS [m].
@@ -220,7 +220,7 @@ def leg_from_corner(arena, target, x0, y0, z0, x1, y1, z1):
         length_m = on_m + arena.node_distance_m[target, n]
         # not the corner itself
         if (
-            on_m > _CREEP_M
+            on_m > CREEP_M
             and length_m < shortest_m
             and in_sight(obstacles, normals, offsets_m, x0, y0, north_m, east_m)
         ):

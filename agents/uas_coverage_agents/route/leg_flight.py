@@ -15,7 +15,7 @@ from uas_coverage_agents.route.landing import towards_home
 from uas_coverage_agents.route.layers import value_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import HEADROOM_M, LEAD_S, passes_over
-from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_hold_and_brake
+from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.vehicle import (
@@ -266,10 +266,10 @@ def spare_distance(arena, i, x, reference, command, n_held, enough_m, path_m, be
     Returns:
         See `fixed_slack`.
     """
-    n_flown, slack_m = fly_hold_and_brake(
-        arena, i, x, reference, command, n_held, False,
-        path_m[: path_m.shape[0] - MOST_HELD + n_held], belief,
-    )  # fmt: skip
+    shown_m = path_m[: path_m.shape[0] - MOST_HELD + n_held]
+    n_flown, slack_m = fly_and_brake(
+        arena, i, x, reference, command, False, shown_m, belief, n_held
+    )
     return fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)
 
 

@@ -14,6 +14,7 @@ from uas_coverage_env.world.broad_phase import (
     HULL_MIDDLE,
     MIDDLE,
     PER_HALF,
+    halves_away,
 )
 
 _FEATURES = (
@@ -209,9 +210,9 @@ def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
     per_half_z = columns[PER_HALF + 2, first : first + n]
     for o in range(n):
         beyond[o] = max(
-            abs(x - middle_x[o]) * per_half_x[o],
-            abs(y - middle_y[o]) * per_half_y[o],
-            abs(z - middle_z[o]) * per_half_z[o],
+            halves_away(x, x, middle_x[o], per_half_x[o]),
+            halves_away(y, y, middle_y[o], per_half_y[o]),
+            halves_away(z, z, middle_z[o], per_half_z[o]),
         )
     # a loop of its own: of one that reads all twelve columns the compiler thinks, for less than
     # twenty obstacles, that vector instructions would not pay

@@ -7,34 +7,35 @@ from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.entities.state import WIND
-from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import VX, VY, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import margin_to_land, seconds_to_land
 from uas_coverage_env.world.overhangs import is_below_overhang, widest_overhang_m
+from uas_coverage_env.world.places import may_be_at
 from uas_coverage_env.world.routes import (
     CLEAR,
     ROUND_CORNER,
-    box_apart,
     crossing,
     leg_from_corner,
     route,
 )
 
-_MOST_LEGS = 12
-_STOPPING = 1.5
-"""Of the time that the largest acceleration takes to stop."""
+_MOST_LEGS = 12  # of a way that are looked at
 
-_ON_WHILE_STOPPING = 0.6
-_PLACES_AROUND = 8
-_RINGS = 2
+_STOPPING = 1.5
+"""Of the time that the largest acceleration takes to stop [-]; `vehicle.range` takes as long for
+turns."""
+
+_ON_WHILE_STOPPING = 0.6  # of that time, for how long the speed now would lead as far [-]
+_PLACES_AROUND, _RINGS = 8, 2  # where a UAS may come to rest after one more step
 
 _WIND_MARGIN_S, _WIND_MARGIN_SHARE = 15.0, 0.15
-"""Where disturbances are declared, the margin is more: this share of the time, and these seconds
-in a wind as fast as the UAS, in which it turns and stops the more slowly."""
+"""Where disturbances are declared, the margin is more: this share of the time [-], and these
+seconds in a wind as fast as the UAS, in which it turns and stops the more slowly. How often that is
+too little: `benchmarks/returns.py --level moderate`."""
 
-_LEAVING_MPS = 0.6
-_LEAVING_S = 15.0
-"""From below an overhang a UAS feels its way at about this speed, and turns at both ends."""
+_LEAVING_MPS, _LEAVING_S = 0.6, 15.0
+"""From below an overhang a UAS feels its way at about this speed, and turns at both ends. Chosen by
+hand; `benchmarks/return_mode.py --families overhangs` shows whether UAS are lost."""
 
 
 @inlined_kernel
@@ -132,7 +133,7 @@ def flight_home(arena, i, x, belief=None):
     """Time to fly UAS i home and land it, past the fixed obstacles.
 
     Args:
-        arena: The arena.
+        arena: The mission.
         i: Index of the UAS.
         x: (14,) its state.
         belief: (N_BELIEF,) of its inner loop; None: in still air.
@@ -141,29 +142,11 @@ def flight_home(arena, i, x, belief=None):
         The expected time [s], and the margin to add to it [s].
     """
     home_m = arena.uas[i].home_m
-    north_m = home_m[0] - x[X]
-    east_m = home_m[1] - x[Y]
+    north_m = home_m[0] - x[S.X]
+    east_m = home_m[1] - x[S.Y]
     away_m = max(math.hypot(north_m, east_m), 1e-9)
-    away_mps = -(north_m * x[VX] + east_m * x[VY]) / away_m
-    return _flight_from(arena, i, x[X], x[Y], x[Z], away_mps, belief)
-
-
-@kernel
-def _may_rest_at(arena, i, x, y, z):
-    """Whether a UAS can be at a place without a breach."""
-    rules = arena.rules[0]
-    normals, offsets_m = arena.normals, arena.offsets_m
-    first, last = rules.fence_first, rules.fence_last
-    if signed_distance(normals, offsets_m, first, last, x, y, z) > -rules.fence_margin_m:
-        return False
-    for o in range(arena.obstacles.shape[0]):
-        obstacle = arena.obstacles[o]
-        if not box_apart(obstacle, x, y, z, x, y, z):
-            first, last = obstacle.first_kept, obstacle.last_kept
-            required_m = arena.uas[i].radius_m + obstacle.safe_distance_m
-            if signed_distance(normals, offsets_m, first, last, x, y, z) < required_m:
-                return False
-    return True
+    away_mps = -(north_m * x[S.VX] + east_m * x[S.VY]) / away_m
+    return _flight_from(arena, i, x[S.X], x[S.Y], x[S.Z], away_mps, belief)
 
 
 @kernel
@@ -174,28 +157,22 @@ def latest_flight_home(arena, i, x, belief):
     rest first: where it would if it braked one step later, or at one of sixteen places around, as
     far away as one and two steps of the largest acceleration lead. From the farthest of these it
     flies home.
-
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        x: (14,) its state.
-        belief: (N_BELIEF,) of its inner loop.
     """
     vehicle = arena.vehicles[i]
     dt_s = vehicle.dt_s
     most_mps2 = vehicle.gravity_mps2 * math.tan(vehicle.tilt_max_rad)
-    stopping_s = _STOPPING * math.hypot(x[VX], x[VY]) / most_mps2
+    stopping_s = _STOPPING * math.hypot(x[S.VX], x[S.VY]) / most_mps2
     on_s = dt_s + _ON_WHILE_STOPPING * stopping_s
     longest_s = _STOPPING * vehicle.v_xy_max_mps / most_mps2
     around_m = most_mps2 * dt_s * (dt_s + _ON_WHILE_STOPPING * longest_s)
-    z = min(x[Z] + dt_s * vehicle.v_down_max_mps, -arena.rules[0].floor_m)
+    z = min(x[S.Z] + dt_s * vehicle.v_down_max_mps, -arena.rules[0].floor_m)
     latest_s = 0.0
     for k in range(_RINGS * _PLACES_AROUND + 1):
         angle = 2.0 * math.pi * k / _PLACES_AROUND
         aside_m = around_m * ((k + _PLACES_AROUND - 1) // _PLACES_AROUND)
-        north_m = x[X] + on_s * x[VX] + aside_m * math.cos(angle)
-        east_m = x[Y] + on_s * x[VY] + aside_m * math.sin(angle)
-        if _may_rest_at(arena, i, north_m, east_m, z):
+        north_m = x[S.X] + on_s * x[S.VX] + aside_m * math.cos(angle)
+        east_m = x[S.Y] + on_s * x[S.VY] + aside_m * math.sin(angle)
+        if may_be_at(arena, i, north_m, east_m, z):
             seconds, margin_s = _flight_from(arena, i, north_m, east_m, z, 0.0, belief)
             latest_s = max(latest_s, seconds + margin_s)
     return dt_s + stopping_s + latest_s

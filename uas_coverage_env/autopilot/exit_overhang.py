@@ -11,21 +11,19 @@ import math
 import numpy as np
 
 from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
-from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.overhangs import is_below_overhang
-from uas_coverage_env.world.routes import box_apart, line_is_clear
+from uas_coverage_env.world.places import may_be_at
+from uas_coverage_env.world.routes import line_is_clear
 
 LEG_TO_TARGET, LEG_TO_PLACE, TARGET_IS_PLACE = range(3)
 """What `past_overhangs` returns."""
 
-_CELL_M = 2.0
-_REACH = 20
+_CELL_M = 2.0  # of the grid
+_REACH = 20  # cells to each side: 40 m; both chosen by hand, `tests/autopilot/test_overhangs.py`
 _SIDE = 2 * _REACH + 1
 _N_CELLS = _SIDE**3
-_MOST_PLACES = 4 * _SIDE
-_FENCE_MARGIN_M = 0.5
-_CREEP_M = 1e-3
+_MOST_PLACES = 4 * _SIDE  # of a way that are kept
 _NEIGHBOURS = np.array(
     [
         (n, e, d)
@@ -39,41 +37,18 @@ _NEIGHBOURS = np.array(
 
 @kernel
 def _is_free(arena, i, x0, y0, z0, x, y, z):
-    """Whether routes may lead through a place, or it is not nearer to anything than the start."""
-    rules = arena.rules[0]
-    normals, offsets_m = arena.normals, arena.offsets_m
-    if -z > rules.ceiling_m or -z < min(lowest_altitude(arena, i, x, y), -z0):
+    """Whether routes may lead through a place, or it is no nearer to anything than the start."""
+    if -z > arena.rules[0].ceiling_m or -z < min(lowest_altitude(arena, i, x, y), -z0):
         return False
-    first, last = rules.fence_first, rules.fence_last
-    inside_m = rules.fence_margin_m + _FENCE_MARGIN_M
-    now_m = -signed_distance(normals, offsets_m, first, last, x0, y0, z0)
-    if -signed_distance(normals, offsets_m, first, last, x, y, z) < min(inside_m, now_m):
-        return False
-    for o in range(arena.obstacles.shape[0]):
-        obstacle = arena.obstacles[o]
-        if box_apart(obstacle, x, y, z, x, y, z):
-            continue
-        first, last = obstacle.first_kept, obstacle.last_kept
-        now_m = signed_distance(normals, offsets_m, first, last, x0, y0, z0) - _CREEP_M
-        there_m = signed_distance(normals, offsets_m, first, last, x, y, z)
-        if there_m < min(obstacle.wall_m, now_m):
-            return False
-    return True
+    return may_be_at(arena, i, x, y, z, (x0, y0, z0))
 
 
 @allocating_kernel
 def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
     """The places along the way out from below the overhangs at a place.
 
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        x0: North of the place [m].
-        y0: East of it [m].
-        z0: Down of it [m].
-        x1: North of where it shall lead [m]: of several ways out, the shortest to there.
-        y1: East of it [m].
-        places_m: (P, 3) [m] written, in order, without the place itself.
+    From (x0, y0, z0), which is not among them; of several ways the shortest to (x1, y1). Written
+    to `places_m` (P, 3) [m], in order.
 
     Returns:
         How many places; 0 where the grid has no way.
@@ -135,16 +110,7 @@ def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
 def past_overhangs(arena, i, x0, y0, z0, x1, y1, z1, place_m):
     """Where to fly first, where a place or a target lies below an overhang.
 
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        x0: North of the UAS [m].
-        y0: East of it [m].
-        z0: Down of it [m].
-        x1: North of its target [m].
-        y1: East of the target [m].
-        z1: Down of the target [m].
-        place_m: (3,) [m] written, unless LEG_TO_TARGET is returned.
+    The UAS is at (x0, y0, z0), its target at (x1, y1, z1).
 
     Returns:
         LEG_TO_TARGET: go on as if there was none; LEG_TO_PLACE: straight to the place, nothing is

@@ -11,27 +11,27 @@ import math
 from uas_coverage_env.autopilot.belief import estimated_speed, speed_along, wind_growth
 from uas_coverage_env.compiled.kernels import kernel, stack_array
 from uas_coverage_env.entities.state import WIND
-from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.obstacles import NODE_MARGIN_M
+from uas_coverage_env.world.places import inside_fence_m
 from uas_coverage_env.world.routes import crossing
 
 LITTLE_MPS = 2.0
-"""Headway below which a UAS flies low: of a wind that is known to about a metre per second."""
+"""Headway below which a UAS flies low: of a wind that is known to about a metre per second. What
+flying low is worth: docs/wind_method.md."""
 
-_HERE_M = 2.0
-"""A place so near has been reached."""
+_HERE_M = 2.0  # a place so near has been reached
 
 
 @kernel
 def _headway_mps(arena, i, x, belief, x1, y1, altitude_m):
     """Ground speed at full airspeed along a leg, at an altitude or where the UAS is higher."""
-    north_m, east_m = x1 - x[X], y1 - x[Y]
+    north_m, east_m = x1 - x[S.X], y1 - x[S.Y]
     length_m = math.hypot(north_m, east_m)
     if length_m < _HERE_M:
         return math.inf
-    share = wind_growth(max(altitude_m, -x[Z]), -x[Z])
+    share = wind_growth(max(altitude_m, -x[S.Z]), -x[S.Z])
     return speed_along(
         arena.vehicles[i].reference_max_mps, share * belief[WIND], share * belief[WIND + 1],
         north_m / length_m, east_m / length_m,
@@ -54,10 +54,7 @@ def _seconds(arena, i, belief, x0, y0, x1, y1, share):
 @kernel
 def _is_free(arena, x0, y0, x1, y1, z):
     """Whether a leg crosses no widened footprint and ends outside of all, inside the fence."""
-    rules = arena.rules[0]
-    first, last = rules.fence_first, rules.fence_last
-    within_m = rules.fence_margin_m + NODE_MARGIN_M
-    if signed_distance(arena.normals, arena.offsets_m, first, last, x1, y1, z) > -within_m:
+    if inside_fence_m(arena, x1, y1, z) < arena.rules[0].fence_margin_m + NODE_MARGIN_M:
         return False
     for o in range(arena.obstacles.shape[0]):
         at, over, ends = crossing(
@@ -71,14 +68,14 @@ def _is_free(arena, x0, y0, x1, y1, z):
 @kernel
 def _over_s(arena, i, x, belief, x1, y1, obstacle, needed_m, low_share):
     """Time to the end of a leg that climbs to needed_m, and is low once behind an obstacle [s]."""
-    climb_m = max(needed_m + x[Z], 0.0)
-    back, _, _ = crossing(obstacle, arena.normals, arena.offsets_m, x1, y1, x[X], x[Y])
+    climb_m = max(needed_m + x[S.Z], 0.0)
+    back, _, _ = crossing(obstacle, arena.normals, arena.offsets_m, x1, y1, x[S.X], x[S.Y])
     past = 1.0 - min(back, 1.0)
-    past_x, past_y = x[X] + past * (x1 - x[X]), x[Y] + past * (y1 - x[Y])
-    over_share = wind_growth(max(needed_m, -x[Z]), -x[Z])
+    past_x, past_y = x[S.X] + past * (x1 - x[S.X]), x[S.Y] + past * (y1 - x[S.Y])
+    over_share = wind_growth(max(needed_m, -x[S.Z]), -x[S.Z])
     return (
         climb_m / arena.uas[i].climb_mps
-        + _seconds(arena, i, belief, x[X], x[Y], past_x, past_y, over_share)
+        + _seconds(arena, i, belief, x[S.X], x[S.Y], past_x, past_y, over_share)
         + _seconds(arena, i, belief, past_x, past_y, x1, y1, low_share)
     )
 
@@ -94,14 +91,14 @@ def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
     nearest, crossed = 2.0, -1
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
-        at, _, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[X], x[Y], x1, y1)
+        at, _, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[S.X], x[S.Y], x1, y1)
         if at < nearest and not ends:
             nearest, crossed = at, o
     if crossed < 0:
         return x1, y1
     obstacle = arena.obstacles[crossed]
-    low_m = max(-arena.uas[i].home_m[2], lowest_altitude(arena, i, x[X], x[Y]))
-    low = 1.0 / wind_growth(-x[Z], low_m)
+    low_m = max(-arena.uas[i].home_m[2], lowest_altitude(arena, i, x[S.X], x[S.Y]))
+    low = 1.0 / wind_growth(-x[S.Z], low_m)
     # from above it, the wind up here is to be flown through first
     first = 1.0 if nearest <= 0.0 else low
     corner_x, corner_y, onward_s = stack_array(4), stack_array(4), stack_array(4)
@@ -128,12 +125,12 @@ def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
     best_s = _over_s(arena, i, x, belief, x1, y1, obstacle, needed_m, low)
     best_x, best_y = x1, y1
     for c in range(4):
-        to_s = _seconds(arena, i, belief, x[X], x[Y], corner_x[c], corner_y[c], first)
-        here = math.hypot(corner_x[c] - x[X], corner_y[c] - x[Y]) < _HERE_M
+        to_s = _seconds(arena, i, belief, x[S.X], x[S.Y], corner_x[c], corner_y[c], first)
+        here = math.hypot(corner_x[c] - x[S.X], corner_y[c] - x[S.Y]) < _HERE_M
         if (
             to_s + onward_s[c] < best_s
             and not here
-            and _is_free(arena, x[X], x[Y], corner_x[c], corner_y[c], x[Z])
+            and _is_free(arena, x[S.X], x[S.Y], corner_x[c], corner_y[c], x[S.Z])
         ):
             best_s, best_x, best_y = to_s + onward_s[c], corner_x[c], corner_y[c]
     return best_x, best_y
@@ -143,15 +140,8 @@ def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
 def low_way(arena, i, x, belief, x1, y1, altitude_m, needed_m):
     """Whether a UAS flies a leg home low, and where to.
 
-    Args:
-        arena: The arena.
-        i: Index of the UAS.
-        x: (14,) its state.
-        belief: (N_BELIEF,) of its inner loop.
-        x1: Where the leg ends, north [m].
-        y1: Likewise, east [m].
-        altitude_m: At which guidance would fly it [m].
-        needed_m: Altitude needed over the low obstacles on it [m]; -inf without one.
+    The leg ends at (x1, y1); guidance would fly it at altitude_m, and over its roofs, if there are
+    any, at needed_m.
 
     Returns:
         (low, north [m], east [m]): a place beside a roof, or the end of the leg.
