@@ -368,5 +368,5 @@ def braking_slack(
     if moving and slack_m >= enough_m:
         slack_m = moving_slack(arena, state.step[0], i, path_m, enough_m, slack_m)
     if slack_m >= enough_m:
-        slack_m = peer_slack(arena, state.uas["status"], i, path_m, committed_m, enough_m, slack_m)
+        slack_m = peer_slack(arena, state.uas, i, path_m, committed_m, enough_m, slack_m)
     return slack_m
