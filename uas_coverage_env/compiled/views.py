@@ -72,7 +72,8 @@ rows_view = _rows_of(None)
 """(array, row, shape) -> the elements of a C-contiguous array from a row on, in another shape.
 
 The array has any number of axes; the row is an index along its first one, and the elements of the
-shape have to lie in the array. A shape of one axis may be a number.
+shape have to lie in the array. A shape of one axis may be a number. A slice looks where it begins
+and ends from the back, and for what lies outside: with it a step takes a twelfth longer.
 """
 
 slice_view = rows_view
