@@ -12,13 +12,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import typeof, types
-from numba.core import cgutils
+from llvmlite import ir
+from numba import from_dtype, typeof, types
 from numba.extending import intrinsic
-from numba.np import numpy_support
-from numba.np.arrayobj import make_array, np_cfarray
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.internals import array_at, parts_of
 from uas_coverage_env.compiled.kernels import COMPILED, inlined_kernel
 from uas_coverage_env.compiled.memory import Field, Memory, Pool, T
 
@@ -35,9 +34,9 @@ def _array_at(typing_context, address, shape, dtype):
 
     def generate(context, builder, signature, arguments):
         start = builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
-        return np_cfarray(context, builder, array(types.voidptr, shape), [start, arguments[1]])
+        return array_at(context, builder, array, start, arguments[1])
 
-    return array(types.int64, shape, dtype), generate
+    return array(types.int64, types.UniTuple(types.intp, len(shape)), dtype), generate
 
 
 def _rows_of(dtype: np.dtype | None) -> Callable[..., Any]:
@@ -51,19 +50,23 @@ def _rows_of(dtype: np.dtype | None) -> Callable[..., Any]:
     def typed(typing_context, array, row, shape):
         if not isinstance(array, types.Array) or array.layout != "C":
             return None
-        kind = array.dtype if dtype is None else numpy_support.from_dtype(dtype)
-        n_axes = len(shape) if isinstance(shape, types.BaseTuple) else 1
-        view = types.Array(kind, n_axes, "C", readonly=not array.mutable)
+        kind = array.dtype if dtype is None else from_dtype(dtype)
+        sizes = shape if isinstance(shape, types.BaseTuple) else (shape,)
+        view = types.Array(kind, len(sizes), "C", readonly=not array.mutable)
+        numbers = types.UniTuple(types.intp, len(sizes)) if sizes is shape else types.intp
 
         def generate(context, builder, signature, arguments):
-            whole = context.make_array(array)(context, builder, arguments[0])
-            first = context.cast(builder, arguments[1], row, types.intp)
-            n_bytes = builder.mul(first, builder.extract_value(whole.strides, 0))
+            whole = parts_of(context, builder, array, arguments[0])
+            first, step = arguments[1], builder.extract_value(whole.strides, 0)
             start = builder.bitcast(whole.data, context.get_value_type(types.voidptr))
-            start = builder.gep(start, [n_bytes])
-            return np_cfarray(context, builder, view(types.voidptr, shape), [start, arguments[2]])
+            start = builder.gep(start, [builder.mul(first, step)])
+            given = arguments[2]
+            if sizes is not shape:
+                one = ir.Constant(context.get_value_type(types.UniTuple(types.intp, 1)), None)
+                given = builder.insert_value(one, given, 0)
+            return array_at(context, builder, view, start, given)
 
-        return view(array, row, shape), generate
+        return view(array, types.intp, numbers), generate
 
     return _in_kernels(typed, plain)
 
@@ -223,15 +226,19 @@ def _sizes(memory: Memory) -> dict[str, str]:
 
 def _copied(typing_context, source, target):
     def generate(context, builder, signature, arguments):
-        for kind, given, written in zip(
-            target,
-            cgutils.unpack_tuple(builder, arguments[0]),
-            cgutils.unpack_tuple(builder, arguments[1]),
-            strict=True,
-        ):
-            origin = make_array(kind)(context, builder, given)
-            copy = make_array(kind)(context, builder, written)
-            cgutils.raw_memcpy(builder, copy.data, origin.data, copy.nitems, copy.itemsize)
+        for k, kind in enumerate(target):
+            given, written = (
+                parts_of(context, builder, kind, builder.extract_value(each, k))
+                for each in arguments
+            )
+            n_bytes = builder.mul(given.nitems, given.itemsize)
+            places = [
+                builder.bitcast(each.data, context.get_value_type(types.voidptr))
+                for each in (written, given)
+            ]
+            kinds = [each.type for each in (*places, n_bytes)]
+            copy = builder.module.declare_intrinsic("llvm.memcpy", kinds)
+            builder.call(copy, [*places, n_bytes, ir.IntType(1)(0)])
         return context.get_dummy_value()
 
     if source != target:
@@ -288,7 +295,9 @@ class Handover:
 
             def generate(context, builder, signature, arguments):
                 owned_by_none = _without_owners(context, builder, value, arguments[0])
-                place = cgutils.alloca_once_value(builder, owned_by_none)
+                with builder.goto_entry_block():
+                    place = builder.alloca(owned_by_none.type)
+                builder.store(owned_by_none, place)
                 return builder.ptrtoint(place, context.get_value_type(types.int64))
 
             return types.int64(value), generate
@@ -308,15 +317,11 @@ class Handover:
 
 def _without_owners(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """The same value, its arrays views: to count references to them would hold up all threads."""
-    if isinstance(kind, types.BaseTuple):
-        kinds: Any = kind
-        parts = zip(kinds, cgutils.unpack_tuple(builder, value), strict=True)
-        return context.make_tuple(
-            builder, kind, [_without_owners(context, builder, *part) for part in parts]
-        )
     if isinstance(kind, types.Array):
-        array = make_array(kind)(context, builder, value)
-        array.meminfo = array.meminfo.type(None)
-        array.parent = array.parent.type(None)
-        return array._getvalue()
+        array = parts_of(context, builder, kind, value)
+        start = builder.bitcast(array.data, context.get_value_type(types.voidptr))
+        return array_at(context, builder, kind, start, array.shape)
+    for k, each in enumerate(kind if isinstance(kind, types.BaseTuple) else ()):
+        part = _without_owners(context, builder, each, builder.extract_value(value, k))
+        value = builder.insert_value(value, part, k)
     return value

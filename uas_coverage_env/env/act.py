@@ -10,7 +10,6 @@ from numba.np import numpy_support
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.control import write_brake
-from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, ActionKind
@@ -30,6 +29,7 @@ from uas_coverage_env.env.memory import (
     WHICH,
     Acting,
 )
+from uas_coverage_env.files.blocks import numbered
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.commands import CLIMB, GO_TO, HOME, VELOCITY
