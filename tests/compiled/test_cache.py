@@ -303,7 +303,7 @@ def digest_where(name: str, text: str) -> str | None:
 
 
 @pytest.mark.parametrize("name", VALUES)
-def test_every_value_of_a_name_that_a_kernel_uses_makes_another_kernel(name):
+def test_every_value_that_a_kernel_names_makes_another_kernel(name):
     digests = [digest_where(name, text) for text in VALUES[name]]
     assert None not in digests
     assert len(set(digests)) == len(digests)

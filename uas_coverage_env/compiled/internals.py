@@ -21,7 +21,7 @@ from typing import Any
 import numba
 from llvmlite import binding
 from numba import types
-from numba.core.caching import CompileResultCacheImpl, NullCache
+from numba.core.caching import CompileResultCacheImpl
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags, compile_result
 from numba.core.registry import CPUDispatcher
@@ -63,7 +63,6 @@ PRIVATE = {
     "compile_result": "what numba expects of a part that is read",
     "get_executable": "what it keeps of one",
     "_cache": "where a dispatcher looks before it compiles",
-    "NullCache": "what it calls of a cache",
     "CompileResultCacheImpl": "how it writes and reads machine code:",
     "_locator": "the folder: __pycache__, NUMBA_CACHE_DIR or the user's cache",
     "check_cachable": "whether code holds addresses of this process",
@@ -262,7 +261,7 @@ class _PartCacheImpl(CompileResultCacheImpl):
         )
 
 
-class _Disk(NullCache):
+class _Disk:
     """The compiled versions of a kernel in one form, a file each.
 
     Numba's own cache compares the file of a function alone: where a function that it calls is
@@ -271,6 +270,8 @@ class _Disk(NullCache):
     write at the same time never mix. Where a kernel has no file (typed into a prompt) or no folder
     can be written to, it is compiled anew in each process.
     """
+
+    cache_path = None  # each kernel has its own
 
     def __init__(self, kernel: Any, form: type[CompileResultCacheImpl], name: str) -> None:
         self._kernel, self._form, self._name = kernel, form, name

@@ -28,6 +28,11 @@ def _in_kernels(typed: Callable[..., Any], plain: Callable[..., Any]) -> Callabl
     return made
 
 
+def _plain_array_at(address: int, shape: tuple[int, ...], dtype: np.dtype) -> NDArray[Any]:
+    memory = (ctypes.c_char * (math.prod(shape) * dtype.itemsize)).from_address(int(address))
+    return np.ndarray(shape, dtype, memoryview(memory))
+
+
 def _array_at(typing_context, address, shape, dtype):
     """The C-contiguous array at an address (int64)."""
     array = types.Array(dtype.dtype, len(shape), "C")
@@ -97,9 +102,9 @@ def record_view(dtype: np.dtype) -> Callable[[NDArray[np.uint64], Any, Any], NDA
 
 def _kernel_of(arguments: str, result: str, known: dict[str, Any]) -> Any:
     """A kernel of one line that names one array after the other: numba has no loop for them."""
-    known |= {"rows": rows_view, "array_at": intrinsic(_array_at)}
+    known |= {"rows": rows_view, "array_at": _in_kernels(_array_at, _plain_array_at)}
     exec(f"def view({arguments}):\n    return {result}", known)  # made of declarations alone
-    return inlined_kernel(known["view"])
+    return inlined_kernel(known["view"])  # without compilation, as it is
 
 
 def _declared(memory: Memory, arrays: Iterable[str], known: dict[str, Any]) -> str:
@@ -128,7 +133,7 @@ class Layout:
         self.names = tuple(dict.fromkeys(name for memory in memories for name in memory.names))
         self._n_fields = sum(len(memory.fields) for memory in memories)
         self.size = self._n_fields + len(self.names)
-        self.views: Any = self._compiled_views() if COMPILED else self._plain_views
+        self.views = self._views()
 
     def addresses_of(self, *missions: tuple) -> NDArray[np.int64]:
         """Where arrays lie, then their sizes; they have to stay there.
@@ -145,7 +150,7 @@ class Layout:
         addresses = [array.ctypes.data for arrays in missions for array in arrays]
         return np.array([*addresses, *(sizes[name] for name in self.names)], dtype=np.int64)
 
-    def _compiled_views(self) -> Any:
+    def _views(self) -> Any:
         sizes = {name: f"at[{self._n_fields + k}]" for k, name in enumerate(self.names)}
         known: dict[str, Any] = {}
         made, k = [], 0
@@ -158,26 +163,9 @@ class Layout:
             made.append(_declared(memory, arrays, known))
         return _kernel_of("at", f"({', '.join(made)},)", known)
 
-    def _plain_views(self, at: NDArray[np.int64]) -> tuple[Any, ...]:
-        sizes = dict(zip(self.names, at[self._n_fields : self.size].tolist(), strict=True))
-        addresses = iter(at[: self._n_fields].tolist())
-        return tuple(
-            memory.made_of({f.name: _at_address(next(addresses), f, sizes) for f in memory.fields})
-            for memory in self.memories
-        )
-
-
-def _at_address(address: int, field: Field, sizes: Mapping[str, int]) -> NDArray[Any]:
-    shape = field.shape(sizes)
-    n_bytes = math.prod(shape) * field.dtype.itemsize
-    memory = memoryview((ctypes.c_char * n_bytes).from_address(address))
-    return np.ndarray(shape, field.dtype, memory)
-
 
 def pool_view(memory: Memory[T]) -> Callable[[Pool, Any], T]:
     """A function for kernels, (pool, s) -> the declaration of mission s, views into the pool."""
-    if not COMPILED:
-        return memory.mission
     known: dict[str, Any] = {}
     arrays = [
         f"rows(pool.arrays.{field.name}, pool.first[s, {f}], {_shape(field, _sizes(memory))})"
@@ -204,12 +192,6 @@ def lane_view(memory: Memory[T], sized_by: Memory) -> Callable[[T, Any, Pool, An
         if set(field.axes[1:]) & set(sized_by.names):
             raise TypeError(f"{field.name}: only its first axis may be of a size of the mission")
 
-    def plain(lanes: T, lane: int, pool: Pool, s: int) -> T:
-        known = dict(zip(sized_by.names, pool.sizes[s].tolist(), strict=True))
-        return memory.lane(lanes, lane, known)
-
-    if not COMPILED:
-        return plain
     known: dict[str, Any] = {}
     arrays = []
     for field in memory.fields:
