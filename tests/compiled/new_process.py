@@ -34,5 +34,5 @@ def _call(folder: str, module: str, name: str, number: float) -> tuple[float, in
     sys.path.insert(0, folder)
     function = getattr(import_module(module), name)
     value = function(number)
-    stats = getattr(function, "stats", None)
+    stats = getattr(getattr(function, "for_python", None), "stats", None)
     return value, len(stats.cache_hits) if stats else 0

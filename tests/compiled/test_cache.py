@@ -1,20 +1,26 @@
 """What is compiled is kept on disk for as long as all the sources it was made from are the same."""
 
-import ast
 import json
 import os
 import shutil
 import subprocess
 import sys
+import types
+from collections import namedtuple
 from concurrent.futures import ThreadPoolExecutor
+from enum import Enum
+from functools import cache
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from new_process import in_new_process
 
-from uas_coverage_env.compiled import source_digest
+from uas_coverage_env.compiled import digest
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 
-PACKAGE = Path(source_digest.__file__).parents[1]
+PACKAGE = Path(digest.__file__).parents[1]
 ROOT = PACKAGE.parent
 
 SOURCES = {
@@ -24,28 +30,28 @@ from craft.parts.motor import thrust
 from craft.parts.cell import charge
 """,
     "craft/parts/motor.py": """
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 FACTOR = 2.0
 @kernel
 def thrust(x):
     return FACTOR * x
 """,
     "craft/parts/cell.py": """
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 @kernel
 def charge(x):
     return x - 1.0
 """,
     "craft/body.py": """
 from craft.parts import thrust
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 @kernel
 def lift(x):
     return thrust(x) + 1.0
 """,
     "sensor.py": """
 from craft.body import lift
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from helper import half
 @kernel
 def sense(x):
@@ -57,7 +63,7 @@ def around(reward):
     return inner
 """,
     "helper.py": """
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 @kernel
 def half(x):
     return 0.5 * x
@@ -72,7 +78,7 @@ sys.modules["uas_coverage_env"] = package
 module, name, number = sys.argv[1:]
 function = getattr(__import__(module, fromlist=[name]), name)
 value = function(float(number))
-stats = getattr(function, "stats", None)
+stats = getattr(getattr(function, "for_python", None), "stats", None)
 print(json.dumps([value, len(stats.cache_hits) if stats else 0]))
 """
 
@@ -132,6 +138,8 @@ def test_an_edited_kernel_is_noticed_by_what_calls_it_from_another_module(craft)
 def test_an_edit_elsewhere_costs_no_compilation(craft):
     called(craft, "sensor", "sense")
     edit(craft / "craft/parts/cell.py", "1.0", "2.0")
+    edit(craft / "craft/parts/motor.py", "@kernel", "# a line\nOTHER = 1.0\n@kernel")
+    edit(craft / "craft/body.py", "    return", '    """What lifts."""\n    return')
     assert called(craft, "sensor", "sense") == (3.5, 1)
     os.utime(craft / "craft/parts/motor.py", (1, 1))  # a fresh checkout of the same contents
     assert called(craft, "sensor", "sense") == (3.5, 1)
@@ -177,7 +185,7 @@ def test_what_was_compiled_from_earlier_sources_is_deleted(craft):
     folder = craft / "craft/__pycache__"
     first = set(folder.glob("*.nbc"))
     for n in range(3):  # the second kernel of a module moves down, too
-        edit(craft / "craft/body.py", "@kernel", "# an edit\n@kernel")
+        edit(craft / "craft/body.py", " + 1.0", " + 1.0 + 1.0")
         called(craft, "craft.body", "lift", number=n)
     assert len(list(folder.glob("*.nbc"))) == len(first) == 1
     assert first.isdisjoint(folder.glob("*.nbc"))
@@ -185,9 +193,9 @@ def test_what_was_compiled_from_earlier_sources_is_deleted(craft):
 
 def test_of_a_function_that_is_built_around_numbers_the_latest_versions_are_kept(craft):
     (craft / "many.py").write_text(
-        "from uas_coverage_env.compiled import cache\n"
-        "from uas_coverage_env.compiled.kernels import kernel\n"
-        "cache._MOST_VERSIONS = 3\n"
+        "from uas_coverage_env.compiled import internals\n"
+        "from uas_coverage_env.compiled.kernels import inlined_kernel, kernel\n"
+        "internals._VERSIONS = 2\n"
         "def plus(y):\n    @kernel\n    def inner(x):\n        return x + y\n    return inner\n"
         "def call(x):\n    return [plus(float(y))(x) for y in range(5)][int(x)]\n"
     )
@@ -201,7 +209,7 @@ def test_a_folder_that_cannot_be_written_to_leaves_the_choice_to_the_users_cache
     there = {"XDG_CACHE_HOME": str(home), "HOME": str(home)}
     assert called(craft, "craft.body", "lift", **there) == (7.0, 0)
     assert called(craft, "craft.body", "lift", **there) == (7.0, 1)
-    assert list(home.rglob("body.lift-*.nbc"))
+    assert list(home.rglob("body.lift.*.nbc"))
 
 
 def test_without_any_place_to_write_to_kernels_are_compiled_in_each_process(craft):
@@ -233,7 +241,7 @@ def test_processes_that_compile_at_the_same_time_leave_a_whole_cache(craft):
 
 def test_a_cache_file_that_was_cut_off_is_replaced(craft):
     called(craft, "craft.body", "lift")
-    (kept,) = (craft / "craft/__pycache__").glob("body.lift-*.nbc")
+    (kept,) = (craft / "craft/__pycache__").glob("body.lift.*.nbc")
     kept.write_bytes(kept.read_bytes()[:100])
     assert called(craft, "craft.body", "lift") == (7.0, 0)
     assert called(craft, "craft.body", "lift") == (7.0, 1)
@@ -247,54 +255,77 @@ def test_without_compilation_kernels_are_plain_functions(craft):
 def test_a_kernel_typed_into_a_prompt_is_compiled_but_not_kept():
     program = """
 import json
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 @kernel
 def twice(x):
     return 2.0 * x
-print(json.dumps([twice(2.0), len(twice.stats.cache_hits)]))
+print(json.dumps([twice(2.0), len(twice.for_python.stats.cache_hits)]))
 """
     assert called(Path.cwd(), "", "", program=program) == (4.0, 0)
 
 
-def test_imports_are_read_from_the_text_as_python_reads_them():
-    for path in PACKAGE.rglob("*.py"):
-        statements = ast.walk(ast.parse(path.read_text()))
-        expected = set()
-        for statement in statements:
-            if isinstance(statement, ast.ImportFrom):
-                expected |= {
-                    (statement.module or "", statement.level, alias.name)
-                    for alias in statement.names
-                }
-            elif isinstance(statement, ast.Import):
-                expected |= {(alias.name, 0, None) for alias in statement.names}
-        read = source_digest._source(str(path)).imports
-        assert expected <= {(one.module, one.level, one.name) for one in read}, path
+VALUES = {
+    "FACTOR": ["2.0", "np.float64(2.0)", "3.0"],
+    "TABLE": ["np.zeros(2)", "np.ones(2)", "np.zeros(3)", "(1, 2)", "[1, 2]"],
+    "KIND": ["np.dtype('f8')", "np.dtype([('a', 'f8')])", "np.dtype([('b', 'f8')])"],
+    "CODE": ["Enum('Code', 'A B').A", "Enum('Code', 'A B').B", "Enum('Code', 'B A').A"],
+    "ROW": ["namedtuple('Row', 'x y')", "namedtuple('Row', 'y x')"],
+    "helper": ["lambda x: x + 1", "lambda x: x + 2", "lambda x, y=1: x + 1"],
+    "cached": ["cache(lambda x: x + 1)", "cache(lambda x: x + 2)"],
+    "part": ["kernel(lambda x: x)", "kernel(lambda x: -x)", "inlined_kernel(lambda x: x)"],
+    "module": ["made('m', X=1)", "made('m', X=2)"],
+}
+"""Values of a name that a kernel uses, each of which makes another kernel of it."""
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("import a.b as c", {("a.b", 0, None, "c")}),
-        ("import a.b", {("a", 0, None, "a.b"), ("a.b", 0, None, "a.b")}),
-        ("x = 1; import a, b", {("a", 0, None, "a"), ("b", 0, None, "b")}),
-        (
-            "from . import (  # one (or two)\n    a,\n    b as c,\n)",
-            {("", 1, "a", "a"), ("", 1, "b", "c")},
-        ),
-        ("if x:\n    from ..p import \\\n        a", {("p", 2, "a", "a")}),
-        ('"""Text\nfrom which nothing is imported\n"""', set()),
-    ],
-)
-def test_every_form_of_import_is_read(tmp_path, text, expected):
-    path = tmp_path / "module.py"
-    path.write_text(text)
-    assert set(source_digest._source(str(path)).imports) == expected
+def made(name: str, **values: object) -> types.ModuleType:
+    module = types.ModuleType(name)
+    vars(module).update(values)
+    return module
 
 
-def test_packages_that_import_from_each_other_in_a_circle_have_a_digest(tmp_path):
-    for name, other in (("a", "b"), ("b", "a")):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "__init__.py").write_text(f"from {other} import name\n")
-    (tmp_path / "module.py").write_text("from a import name\n")
-    assert len(source_digest.source_digest(str(tmp_path / "module.py"))) == 64
+KNOWN = {
+    "np": np,
+    "made": made,
+    "cache": cache,
+    "namedtuple": namedtuple,
+    "Enum": Enum,
+    "kernel": kernel,
+    "inlined_kernel": inlined_kernel,
+}
+
+
+def digest_where(name: str, text: str) -> str | None:
+    there = {**KNOWN, "__name__": "somewhere"}
+    exec(f"def use(x):\n    return {name}.X(x)", there)
+    there[name] = eval(text, there)
+    return digest.digest_of(kernel(there["use"]))
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_every_value_that_a_kernel_names_makes_another_kernel(name):
+    digests = [digest_where(name, text) for text in VALUES[name]]
+    assert None not in digests
+    assert len(set(digests)) == len(digests)
+    assert digests == [digest_where(name, text) for text in VALUES[name]]
+
+
+def test_what_only_this_process_knows_by_its_address_has_no_digest():
+    assert digest_where("one", "object()") is None
+
+
+def test_an_edited_string_is_noticed_and_a_docstring_is_none():
+    def text_of(source: str) -> str | None:
+        there: dict[str, Any] = {"__name__": "somewhere"}
+        exec(source, there)
+        return digest.digest_of(kernel(there["use"]))
+
+    plain = text_of("def use(x):\n    return x == 'a'")
+    assert plain != text_of("def use(x):\n    return x == 'b'")
+    assert plain == text_of("def use(x):\n    'Says whether.'\n    return x == 'a'")
+
+
+def test_kernels_that_call_each_other_have_a_digest():
+    there: dict[str, Any] = {"__name__": "somewhere"}
+    exec("def a(x):\n    return b(x)\ndef b(x):\n    return a(x)", there)
+    assert digest.digest_of(kernel(there["a"]))

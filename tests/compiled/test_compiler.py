@@ -77,9 +77,9 @@ def test_what_only_kernels_call_is_not_made_callable():
         return inner(x)
 
     assert outer(1.0) == 2.0
-    assert outer.signatures
-    assert not inner.signatures
-    assert inner.part.signatures or outer.stats.cache_hits
+    assert outer.for_python.signatures
+    assert not inner.for_python.signatures
+    assert inner.signatures or outer.for_python.stats.cache_hits
 
 
 def test_a_kernel_is_called_by_kernels_and_by_python():

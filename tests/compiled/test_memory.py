@@ -9,7 +9,6 @@ from typing_extensions import TypeAliasType
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.memory import Memory, Values
-from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.compiled.views import (
     Layout,
     copy_arrays,
@@ -18,6 +17,7 @@ from uas_coverage_env.compiled.views import (
     record_view,
     rows_view,
 )
+from uas_coverage_env.env.slots import Slots
 
 S = TypeVar("S", bound=np.generic)
 NESTED = np.ndarray[tuple[Any, ...], np.dtype[S]]

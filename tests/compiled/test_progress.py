@@ -1,17 +1,18 @@
 """Whoever waits for a compilation is told so, once."""
 
 import logging
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from uas_coverage_env.compiled import progress
-from uas_coverage_env.compiled.compiler import called_by
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.progress import (
     COMPILATIONS,
     NOTICE,
     Compilations,
+    called_by,
     compiling_for,
     listening,
 )
@@ -39,8 +40,12 @@ def fresh():
     offset = float(np.random.default_rng().uniform())
 
     @kernel
-    def new(x):
+    def part(x):
         return second(x) + offset
+
+    @kernel
+    def new(x):
+        return part(x)
 
     return new
 
@@ -140,19 +145,17 @@ def test_a_compilation_that_fails_has_an_end_too():
 
 def test_the_kernels_of_a_kernel_are_counted_through_names_and_cells():
     assert called_by(first) == {second, third}
-    assert called_by(fresh()) == {second, third}
+    assert called_by(fresh()) > {second, third}
 
 
 def test_patience_counts_what_earlier_compilations_took(monkeypatch):
-    times = iter([0.0, 0.4, 0.6, 0.6, 1.0, 1.3, 1.7, 1.7, 1.7, 1.7])
+    times = iter([0.0, 0.4, 0.6, 0.6, 0.6, 1.1, 1.3, 1.3])
     monkeypatch.setattr(progress.time, "perf_counter", lambda: next(times))
     told = []
     compilations = Compilations()
     compilations.listener = told.append
-    with compilations.one(lambda: 2):
-        compilations.begun()
-    assert told == []
-    with compilations.one(lambda: 2):
-        compilations.begun()
-        compilations.made("part")
-    assert told == [0.375, None]
+    for _ in range(2):
+        happening = SimpleNamespace(data={"dispatcher": first})
+        compilations.on_start(happening)
+        compilations.on_end(happening)
+    assert told == [0.0, None]

@@ -9,7 +9,7 @@ from changing_missions import EVENTS, mission
 from numba import typeof
 from own_actions import CLIMB_RATE
 
-from uas_coverage_env.compiled.compiler import KernelDispatcher
+from uas_coverage_env.compiled.internals import KernelDispatcher
 from uas_coverage_env.env import cuda as missions_on_gpu
 
 COMPUTE_CAPABILITY = (8, 0)
@@ -54,7 +54,7 @@ def test_numba_finds_the_types_of_all_that_the_step_calls(missions):
     called = [part for part in parts if isinstance(part, KernelDispatcher)]
     assert len(called) == 5
     for kernel in called:
-        kernel.part.compile(tuple(types[name] for name in signature(kernel.py_func).parameters))
+        kernel.compile(tuple(types[name] for name in signature(kernel.py_func).parameters))
 
 
 def test_the_step_compiles_for_a_gpu(compiler, missions):

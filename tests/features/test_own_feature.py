@@ -1,4 +1,4 @@
-"""A feature is one file: what lies in the folder, or is announced by a package, is known everywhere."""
+"""A feature is one file: what lies in the folder, or a package announces, is known everywhere."""
 
 import json
 import subprocess

@@ -11,9 +11,10 @@ from functools import cache
 from typing import Any
 
 from numba import types
-from numba.core import cgutils, errors
+from numba.core import errors
 from numba.extending import intrinsic
 
+from uas_coverage_env.compiled.internals import address_of, call_at
 from uas_coverage_env.compiled.kernels import COMPILED
 from uas_coverage_env.plugins.users_code import described, place_of_function
 
@@ -86,14 +87,13 @@ def _address_of(kernel: Any, arguments: tuple[types.Type, ...], result: types.Ty
             f"{name} is no compiled function; decorate it with compiled.kernels.kernel"
         )
     try:
-        compiled = getattr(kernel, "at_address", kernel).get_compile_result(result(*arguments))
+        code, returned = address_of(kernel, result(*arguments))
     except Exception as error:  # numba raises anything at what it cannot compile
         where = place_of_function(kernel.py_func)
         raise ValueError(f"{name} cannot be compiled: {described(error)}{where}") from error
-    returned = compiled.signature.return_type
     if returned != result:
         raise ValueError(f"{name} returns {returned}; it should return {result}")
-    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+    return code
 
 
 def _made(
@@ -107,12 +107,8 @@ def _made(
             raise errors.TypingError(f"a kernel here takes {expected}, not {given}")
 
         def generate(context, builder, signature, values):
-            convention = context.call_conv
-            code = convention.get_function_type(result, expected)
-            at = builder.inttoptr(values[0], code.as_pointer())
-            status, value = convention.call_function(builder, at, result, expected, values[1:])
-            with cgutils.if_unlikely(builder, status.is_error):
-                convention.return_status_propagate(builder, status)
+            address, *handed_over = values
+            value = call_at(context, builder, address, result, expected, handed_over)
             return context.get_dummy_value() if result == types.none else value
 
         return result(types.int64, *expected), generate

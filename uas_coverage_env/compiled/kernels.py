@@ -6,7 +6,7 @@ step outlive it, so nothing has to be counted. The price is that such a kernel c
 what it needs for a while lies on the stack (`stack_array`). The same source compiles for a GPU.
 
 Whatever is compiled with these decorators is kept on disk by the contents of its sources
-(`cache.py`).
+(`internals.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -15,13 +15,11 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import config, typeof, types
-from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.cache import keep_on_disk
-from uas_coverage_env.compiled.compiler import KernelDispatcher
+from uas_coverage_env.compiled import progress  # noqa: F401  that is told of each compilation
+from uas_coverage_env.compiled.internals import KernelDispatcher, array_at, parts_of
 
 COMPILED = not config.DISABLE_JIT  # pyrefly: ignore[missing-attribute]
 """Whether kernels are compiled; with NUMBA_DISABLE_JIT=1 they run as Python."""
@@ -35,9 +33,7 @@ def _decorator(**options: Any) -> Any:
             return _decorator(**options, **more)
         if not COMPILED:
             return function
-        compiled = KernelDispatcher(function, targetoptions={"nopython": True, **options})
-        keep_on_disk(compiled)
-        return compiled
+        return KernelDispatcher(function, targetoptions={"nopython": True, **options})
 
     return decorate
 
@@ -76,7 +72,7 @@ def machine_code(function: Any, arguments: Sequence[Any]) -> Callable[..., Any]:
     """
     if not COMPILED:
         return function
-    return function.compile(tuple(map(typeof, arguments)))
+    return function.for_python.compile(tuple(map(typeof, arguments)))
 
 
 def interpreted(kernel: Any) -> Callable[..., Any]:
@@ -111,19 +107,11 @@ def _on_the_stack(number: types.Float, element: ir.Type) -> Any:
             return None
 
         def generate(context, builder, signature, arguments):
-            data = cgutils.alloca_once(builder, ir.ArrayType(element, size.literal_value))
-            array = make_array(signature.return_type)(context, builder)
-            width = context.get_constant(types.intp, number.bitwidth // 8)
-            populate_array(
-                array,
-                data=builder.bitcast(data, element.as_pointer()),
-                shape=[context.get_constant(types.intp, size.literal_value)],
-                strides=[width],
-                itemsize=width,
-                meminfo=None,
-                parent=None,
-            )
-            return array._getvalue()
+            with builder.goto_entry_block():
+                place = builder.alloca(ir.ArrayType(element, size.literal_value))
+            pointer = builder.bitcast(place, context.get_value_type(types.voidptr))
+            shape = context.get_value_type(types.UniTuple(types.intp, 1))([size.literal_value])
+            return array_at(context, builder, signature.return_type, pointer, shape)
 
         return types.Array(number, 1, "C")(size), generate
 
@@ -165,11 +153,12 @@ def _expected_false() -> Any:
     def make(typing_context, condition):
         def generate(context, builder, signature, arguments):
             bit = ir.IntType(1)
-            kind = ir.FunctionType(bit, [bit, bit])
-            code = cgutils.get_or_insert_function(builder.module, kind, "llvm.expect.i1")
-            given = context.cast(builder, arguments[0], condition, types.boolean)
-            given = builder.trunc(given, bit) if given.type != bit else given
-            return builder.call(code, [given, bit(0)])
+            (given,) = arguments
+            given = builder.icmp_unsigned("!=", given, given.type(0))
+            expect = builder.module.declare_intrinsic(
+                "llvm.expect", [bit], ir.FunctionType(bit, [bit, bit])
+            )
+            return builder.call(expect, [given, bit(0)])
 
         return types.boolean(condition), generate
 
@@ -186,26 +175,30 @@ def prefetch(array: NDArray[Any]) -> None:
     """
 
 
-def _prefetched(typing_context, array):
+def _prefetched(array):
+    for at in range(0, array.size * array.itemsize, _LINE):
+        _prefetch_line(array, at)
+
+
+@intrinsic
+def _prefetch_line(typing_context, array, at):
+    """Fetch the line `at` bytes (int64) behind the beginning of an array."""
+
     def generate(context, builder, signature, arguments):
-        view = make_array(array)(context, builder, arguments[0])
-        address, flag = cgutils.voidptr_t, ir.IntType(32)
-        kind = ir.FunctionType(ir.VoidType(), [address, flag, flag, flag])
-        code = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
-        how = [flag(1), flag(3), flag(1)]  # to be written, kept in all caches, data
-        begin, step = context.get_constant(types.intp, 0), context.get_constant(types.intp, _LINE)
-        n_bytes = builder.mul(view.nitems, view.itemsize)
-        start = builder.bitcast(view.data, address)
-        with cgutils.for_range_slice(builder, begin, n_bytes, step, inc=True) as (at, _):
-            builder.call(code, [builder.gep(start, [at]), *how])
+        flag, pointer = ir.IntType(32), context.get_value_type(types.voidptr)
+        begin = parts_of(context, builder, array, arguments[0]).data
+        kind = ir.FunctionType(ir.VoidType(), [pointer, flag, flag, flag])
+        fetch = builder.module.declare_intrinsic("llvm.prefetch", [pointer], kind)
+        place = builder.gep(builder.bitcast(begin, pointer), [arguments[1]])
+        # to be written, kept in all caches, data
+        builder.call(fetch, [place, flag(1), flag(3), flag(1)])
         return context.get_dummy_value()
 
-    return types.none(array), generate
+    return types.none(array, types.int64), generate
 
 
 if COMPILED:
     lowest_bit = _trailing_zeros()
-    ahead: Any = intrinsic(_prefetched)
-    rarely, prefetch = _expected_false(), ahead
+    rarely, prefetch = _expected_false(), inlined_kernel(_prefetched)
     stack_array = _on_the_stack(types.float64, ir.DoubleType())
     stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())

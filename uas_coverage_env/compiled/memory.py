@@ -28,8 +28,7 @@ from typing import (
 )
 
 import numpy as np
-from numba import types
-from numba.np import numpy_support
+from numba import typeof
 from numpy.typing import NDArray
 
 T = TypeVar("T", bound=tuple)
@@ -80,10 +79,6 @@ class Field:
     def shape(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
         """Its shape where the named sizes are known."""
         return tuple(sizes[axis] if isinstance(axis, str) else axis for axis in self.axes)
-
-    def numba_type(self) -> Any:
-        """The array as a type of numba's."""
-        return types.Array(numpy_support.from_dtype(self.dtype), len(self.axes), "C")
 
 
 def _scalars(annotation: Any) -> set[type[np.generic]]:
@@ -283,8 +278,7 @@ class Memory(Generic[T]):
 
     def numba_type(self) -> Any:
         """The declaration as a type of numba's."""
-        elements = tuple(field.numba_type() for field in self.fields)
-        return types.BaseTuple.from_types(elements, self.declaration)
+        return typeof(self.zeros(dict.fromkeys(self.names, 0)))
 
 
 def _end_to_end(blocks: Sequence[NDArray[Any]]) -> tuple[NDArray[Any], list[int]]:

@@ -11,6 +11,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from numba.core import event
+
+from uas_coverage_env.compiled.internals import KernelDispatcher, MachineCode
+
 NOTICE = "compiling for {purpose}: up to a minute, and kept on disk for later runs ..."
 
 PATIENCE_S = 1.0
@@ -38,80 +42,69 @@ def _say_it_once() -> Listener:
         if _logger.isEnabledFor(logging.INFO) and _logger.hasHandlers():
             _logger.info(notice)
         else:
-            sys.stderr.write(f"uas_coverage_env: {notice}\n")
-            sys.stderr.flush()
+            print(f"uas_coverage_env: {notice}", file=sys.stderr, flush=True)
 
     return listener
 
 
-class Compilations:
-    """What a process compiles for Python, one kernel after the other.
+class Compilations(event.Listener):
+    """What a process compiles, as numba tells: kernels, and the kernels that they call.
 
     Attributes:
         listener: Told once the process has spent more than PATIENCE_S.
         purpose: What they are for, in words.
         n_compiled: Kernels compiled so far, each of its parts counted.
-        spent_s: What that has taken [s].
     """
 
     def __init__(self) -> None:
         self.listener = _say_it_once()
         self.purpose = "this program"
         self.n_compiled = 0
-        self.spent_s = 0.0
-        self._since_s = 0.0
-        self._depth = 0
-        self._compiles = False
-        self._made: set[Any] = set()
-        self._count: Callable[[], int] = int
-        self._n_parts = 0
+        self.spent_s = self._since_s = 0.0
+        self._depth = self._n_made = self._n_parts = 0
 
-    @contextmanager
-    def one(self, count: Callable[[], int]) -> Iterator[None]:
-        """A kernel is compiled, or read from the disk.
-
-        Args:
-            count: Says how many kernels it consists of.
-        """
-        self._depth += 1
-        if self._depth == 1:
-            self._count, self._compiles = count, False
-            self._since_s = time.perf_counter()
-            self._made.clear()
-        try:
-            yield
-        finally:
-            self._depth -= 1
-            if self._depth == 0 and self._compiles:
-                if self._patience_is_over():
-                    self.listener(None)
-                self.spent_s += time.perf_counter() - self._since_s
-
-    def begun(self) -> None:
-        """A kernel, or a part of it, is not on the disk."""
-        self.n_compiled += 1
-        if self._depth == 0:  # a function of numba's own calls a kernel
-            return
-        if not self._compiles:
-            self._compiles = True
-            self._n_parts = self._count()
-        self._tell()
-
-    def made(self, part: Any) -> None:
-        """A kernel that another one calls is there."""
-        self._made.add(part)
-        if self._compiles:
+    def on_start(self, event: Any) -> None:
+        """A kernel that is not on the disk is compiled."""
+        kernel = event.data["dispatcher"]
+        if isinstance(kernel, KernelDispatcher | MachineCode):
+            self.n_compiled += 1
+            self._depth += 1
+            if self._depth == 1:
+                self._since_s, self._n_made = time.perf_counter(), 0
+                self._n_parts = max(len(called_by(kernel)), 1)
             self._tell()
 
-    def _tell(self) -> None:
-        if self._patience_is_over():
-            self.listener(_SHARE_OF_PARTS * min(len(self._made) / max(self._n_parts, 1), 1.0))
+    def on_end(self, event: Any) -> None:
+        """It is there, or cannot be compiled."""
+        if isinstance(event.data["dispatcher"], KernelDispatcher | MachineCode):
+            self._depth -= 1
+            self._n_made += 1
+            self._tell()
+            if self._depth == 0:
+                self.spent_s += time.perf_counter() - self._since_s
 
-    def _patience_is_over(self) -> bool:
-        return self.spent_s + time.perf_counter() - self._since_s > PATIENCE_S
+    def _tell(self) -> None:
+        if self.spent_s + time.perf_counter() - self._since_s > PATIENCE_S:
+            share = _SHARE_OF_PARTS * min(self._n_made / self._n_parts, 1.0)
+            self.listener(share if self._depth else None)
+
+
+def called_by(kernel: Any) -> set[KernelDispatcher]:
+    """All kernels that a kernel calls by their names, directly or not."""
+    reached: set[KernelDispatcher] = set()
+    found = [kernel]
+    while found:
+        function = found.pop().py_func
+        cells = (cell.cell_contents for cell in function.__closure__ or ())
+        named = (function.__globals__.get(name) for name in function.__code__.co_names)
+        called = {one for one in (*named, *cells) if isinstance(one, KernelDispatcher)} - reached
+        reached |= called
+        found += called
+    return reached
 
 
 COMPILATIONS = Compilations()
+event.register("numba:compile", COMPILATIONS)
 
 
 @contextmanager

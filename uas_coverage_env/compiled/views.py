@@ -12,13 +12,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import typeof, types
-from numba.core import cgutils
+from llvmlite import ir
+from numba import from_dtype, typeof, types
 from numba.extending import intrinsic
-from numba.np import numpy_support
-from numba.np.arrayobj import make_array, np_cfarray
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.internals import array_at, parts_of
 from uas_coverage_env.compiled.kernels import COMPILED, inlined_kernel
 from uas_coverage_env.compiled.memory import Field, Memory, Pool, T
 
@@ -29,15 +28,20 @@ def _in_kernels(typed: Callable[..., Any], plain: Callable[..., Any]) -> Callabl
     return made
 
 
+def _plain_array_at(address: int, shape: tuple[int, ...], dtype: np.dtype) -> NDArray[Any]:
+    memory = (ctypes.c_char * (math.prod(shape) * dtype.itemsize)).from_address(int(address))
+    return np.ndarray(shape, dtype, memoryview(memory))
+
+
 def _array_at(typing_context, address, shape, dtype):
     """The C-contiguous array at an address (int64)."""
     array = types.Array(dtype.dtype, len(shape), "C")
 
     def generate(context, builder, signature, arguments):
         start = builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
-        return np_cfarray(context, builder, array(types.voidptr, shape), [start, arguments[1]])
+        return array_at(context, builder, array, start, arguments[1])
 
-    return array(types.int64, shape, dtype), generate
+    return array(types.int64, types.UniTuple(types.intp, len(shape)), dtype), generate
 
 
 def _rows_of(dtype: np.dtype | None) -> Callable[..., Any]:
@@ -51,19 +55,23 @@ def _rows_of(dtype: np.dtype | None) -> Callable[..., Any]:
     def typed(typing_context, array, row, shape):
         if not isinstance(array, types.Array) or array.layout != "C":
             return None
-        kind = array.dtype if dtype is None else numpy_support.from_dtype(dtype)
-        n_axes = len(shape) if isinstance(shape, types.BaseTuple) else 1
-        view = types.Array(kind, n_axes, "C", readonly=not array.mutable)
+        kind = array.dtype if dtype is None else from_dtype(dtype)
+        sizes = shape if isinstance(shape, types.BaseTuple) else (shape,)
+        view = types.Array(kind, len(sizes), "C", readonly=not array.mutable)
+        numbers = types.UniTuple(types.intp, len(sizes)) if sizes is shape else types.intp
 
         def generate(context, builder, signature, arguments):
-            whole = context.make_array(array)(context, builder, arguments[0])
-            first = context.cast(builder, arguments[1], row, types.intp)
-            n_bytes = builder.mul(first, builder.extract_value(whole.strides, 0))
+            whole = parts_of(context, builder, array, arguments[0])
+            first, step = arguments[1], builder.extract_value(whole.strides, 0)
             start = builder.bitcast(whole.data, context.get_value_type(types.voidptr))
-            start = builder.gep(start, [n_bytes])
-            return np_cfarray(context, builder, view(types.voidptr, shape), [start, arguments[2]])
+            start = builder.gep(start, [builder.mul(first, step)])
+            given = arguments[2]
+            if sizes is not shape:
+                one = ir.Constant(context.get_value_type(types.UniTuple(types.intp, 1)), None)
+                given = builder.insert_value(one, given, 0)
+            return array_at(context, builder, view, start, given)
 
-        return view(array, row, shape), generate
+        return view(array, types.intp, numbers), generate
 
     return _in_kernels(typed, plain)
 
@@ -72,7 +80,8 @@ rows_view = _rows_of(None)
 """(array, row, shape) -> the elements of a C-contiguous array from a row on, in another shape.
 
 The array has any number of axes; the row is an index along its first one, and the elements of the
-shape have to lie in the array. A shape of one axis may be a number.
+shape have to lie in the array. A shape of one axis may be a number. A slice looks where it begins
+and ends from the back, and for what lies outside: with it a step takes a twelfth longer.
 """
 
 slice_view = rows_view
@@ -93,9 +102,9 @@ def record_view(dtype: np.dtype) -> Callable[[NDArray[np.uint64], Any, Any], NDA
 
 def _kernel_of(arguments: str, result: str, known: dict[str, Any]) -> Any:
     """A kernel of one line that names one array after the other: numba has no loop for them."""
-    known |= {"rows": rows_view, "array_at": intrinsic(_array_at)}
+    known |= {"rows": rows_view, "array_at": _in_kernels(_array_at, _plain_array_at)}
     exec(f"def view({arguments}):\n    return {result}", known)  # made of declarations alone
-    return inlined_kernel(known["view"])
+    return inlined_kernel(known["view"])  # without compilation, as it is
 
 
 def _declared(memory: Memory, arrays: Iterable[str], known: dict[str, Any]) -> str:
@@ -124,7 +133,7 @@ class Layout:
         self.names = tuple(dict.fromkeys(name for memory in memories for name in memory.names))
         self._n_fields = sum(len(memory.fields) for memory in memories)
         self.size = self._n_fields + len(self.names)
-        self.views: Any = self._compiled_views() if COMPILED else self._plain_views
+        self.views = self._views()
 
     def addresses_of(self, *missions: tuple) -> NDArray[np.int64]:
         """Where arrays lie, then their sizes; they have to stay there.
@@ -141,7 +150,7 @@ class Layout:
         addresses = [array.ctypes.data for arrays in missions for array in arrays]
         return np.array([*addresses, *(sizes[name] for name in self.names)], dtype=np.int64)
 
-    def _compiled_views(self) -> Any:
+    def _views(self) -> Any:
         sizes = {name: f"at[{self._n_fields + k}]" for k, name in enumerate(self.names)}
         known: dict[str, Any] = {}
         made, k = [], 0
@@ -154,35 +163,16 @@ class Layout:
             made.append(_declared(memory, arrays, known))
         return _kernel_of("at", f"({', '.join(made)},)", known)
 
-    def _plain_views(self, at: NDArray[np.int64]) -> tuple[Any, ...]:
-        sizes = dict(zip(self.names, at[self._n_fields : self.size].tolist(), strict=True))
-        addresses = iter(at[: self._n_fields].tolist())
-        return tuple(
-            memory.made_of({f.name: _at_address(next(addresses), f, sizes) for f in memory.fields})
-            for memory in self.memories
-        )
-
 
 def replaced(memory: Memory[T], name: str) -> Callable[[T, Any], T]:
     """A function for kernels, (arrays, array) -> the declaration with this array of that name."""
-    if not COMPILED:
-        return lambda arrays, array: memory.made_of({**arrays._asdict(), name: array})
     known: dict[str, Any] = {}
     kept = ("array" if f.name == name else f"arrays.{f.name}" for f in memory.fields)
     return _kernel_of("arrays, array", _declared(memory, kept, known), known)
 
 
-def _at_address(address: int, field: Field, sizes: Mapping[str, int]) -> NDArray[Any]:
-    shape = field.shape(sizes)
-    n_bytes = math.prod(shape) * field.dtype.itemsize
-    memory = memoryview((ctypes.c_char * n_bytes).from_address(address))
-    return np.ndarray(shape, field.dtype, memory)
-
-
 def pool_view(memory: Memory[T]) -> Callable[[Pool, Any], T]:
     """A function for kernels, (pool, s) -> the declaration of mission s, views into the pool."""
-    if not COMPILED:
-        return memory.mission
     known: dict[str, Any] = {}
     arrays = [
         f"rows(pool.arrays.{field.name}, pool.first[s, {f}], {_shape(field, _sizes(memory))})"
@@ -209,12 +199,6 @@ def lane_view(memory: Memory[T], sized_by: Memory) -> Callable[[T, Any, Pool, An
         if set(field.axes[1:]) & set(sized_by.names):
             raise TypeError(f"{field.name}: only its first axis may be of a size of the mission")
 
-    def plain(lanes: T, lane: int, pool: Pool, s: int) -> T:
-        known = dict(zip(sized_by.names, pool.sizes[s].tolist(), strict=True))
-        return memory.lane(lanes, lane, known)
-
-    if not COMPILED:
-        return plain
     known: dict[str, Any] = {}
     arrays = []
     for field in memory.fields:
@@ -231,15 +215,19 @@ def _sizes(memory: Memory) -> dict[str, str]:
 
 def _copied(typing_context, source, target):
     def generate(context, builder, signature, arguments):
-        for kind, given, written in zip(
-            target,
-            cgutils.unpack_tuple(builder, arguments[0]),
-            cgutils.unpack_tuple(builder, arguments[1]),
-            strict=True,
-        ):
-            origin = make_array(kind)(context, builder, given)
-            copy = make_array(kind)(context, builder, written)
-            cgutils.raw_memcpy(builder, copy.data, origin.data, copy.nitems, copy.itemsize)
+        for k, kind in enumerate(target):
+            given, written = (
+                parts_of(context, builder, kind, builder.extract_value(each, k))
+                for each in arguments
+            )
+            n_bytes = builder.mul(given.nitems, given.itemsize)
+            places = [
+                builder.bitcast(each.data, context.get_value_type(types.voidptr))
+                for each in (written, given)
+            ]
+            kinds = [each.type for each in (*places, n_bytes)]
+            copy = builder.module.declare_intrinsic("llvm.memcpy", kinds)
+            builder.call(copy, [*places, n_bytes, ir.IntType(1)(0)])
         return context.get_dummy_value()
 
     if source != target:
@@ -296,7 +284,9 @@ class Handover:
 
             def generate(context, builder, signature, arguments):
                 owned_by_none = _without_owners(context, builder, value, arguments[0])
-                place = cgutils.alloca_once_value(builder, owned_by_none)
+                with builder.goto_entry_block():
+                    place = builder.alloca(owned_by_none.type)
+                builder.store(owned_by_none, place)
                 return builder.ptrtoint(place, context.get_value_type(types.int64))
 
             return types.int64(value), generate
@@ -316,15 +306,11 @@ class Handover:
 
 def _without_owners(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """The same value, its arrays views: to count references to them would hold up all threads."""
-    if isinstance(kind, types.BaseTuple):
-        kinds: Any = kind
-        parts = zip(kinds, cgutils.unpack_tuple(builder, value), strict=True)
-        return context.make_tuple(
-            builder, kind, [_without_owners(context, builder, *part) for part in parts]
-        )
     if isinstance(kind, types.Array):
-        array = make_array(kind)(context, builder, value)
-        array.meminfo = array.meminfo.type(None)
-        array.parent = array.parent.type(None)
-        return array._getvalue()
+        array = parts_of(context, builder, kind, value)
+        start = builder.bitcast(array.data, context.get_value_type(types.voidptr))
+        return array_at(context, builder, kind, start, array.shape)
+    for k, each in enumerate(kind if isinstance(kind, types.BaseTuple) else ()):
+        part = _without_owners(context, builder, each, builder.extract_value(value, k))
+        value = builder.insert_value(value, part, k)
     return value

@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from numba import types
-from numba.np import numpy_support
+from numba import from_dtype, types
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.control import write_brake
-from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.entities.commands import CLIMB, GO_TO, HOME, VELOCITY
@@ -32,6 +30,7 @@ from uas_coverage_env.env.memory import (
     WHICH,
     Acting,
 )
+from uas_coverage_env.files.blocks import numbered
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING
 from uas_coverage_env.world.arena import ARENA
 
@@ -45,7 +44,7 @@ def _types() -> tuple[types.Type, ...]:
     numbers = types.Array(types.float64, 1, "C")
     return (
         ARENA.numba_type(), STATE.numba_type(), TABLES.numba_type(), LEARNERS.numba_type(),
-        types.int64, numbers, numbers, numpy_support.from_dtype(COMMAND_DTYPE),
+        types.int64, numbers, numbers, from_dtype(COMMAND_DTYPE),
     )  # fmt: skip
 
 

@@ -4,8 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange, types
-from numba.np.ufunc import get_thread_id
+from numba import get_thread_id, prange, types
 
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import (

@@ -9,11 +9,11 @@ from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory
-from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, TABLES, Tables
 from uas_coverage_env.env.pool import MissionPool, ScenarioPool
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.slots import Slots
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.features.feature import fitted_to, in_slots, memory_words
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Pool
-from uas_coverage_env.compiled.slots import Slots
 from uas_coverage_env.compiled.views import lane_view, pool_view
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.actions import actions_of
@@ -21,6 +20,7 @@ from uas_coverage_env.env.memory import (
 )
 from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.slots import Slots
 from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
 from uas_coverage_env.features.feature import Feature, fitted_to, in_slots
 from uas_coverage_env.scenario import Room, Scenario, loaded_scenario

@@ -7,7 +7,6 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
@@ -25,6 +24,7 @@ from uas_coverage_env.env.memory import (
 )
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm
 from uas_coverage_env.env.rewards import terms as default
+from uas_coverage_env.files.blocks import numbered
 from uas_coverage_env.world.arena import ARENA
 
 _AT = numbered(REWARD_TERMS, range(len(REWARD)))

@@ -7,12 +7,12 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.blocks import checked_blocks
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, observation_named
 from uas_coverage_env.env.rewards import REWARD, RewardTerm, weights_of
 from uas_coverage_env.features.feature import Feature, checked_features
+from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.world.packs import mission_features

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.blocks import check_parameters, checked_blocks
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.compiled.views import record_view
 from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.files.blocks import check_parameters, checked_blocks
 
 DISTURBANCE_MEMORY = 16
 """Numbers that a disturbance may keep for each UAS from step to step."""

@@ -8,6 +8,7 @@ Loops go over views of a hull's own rows: of their indices the compiler knows th
 import math
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.views import rows_view
 
 _SURE_M = 1e-6
 """More than rounding can change in a distance [m]."""
@@ -29,8 +30,8 @@ def signed_distance(normals, offsets_m, first, last, x, y, z):
     Returns:
         [m], negative inside.
     """
-    faces = normals[first:last]
-    away_m = offsets_m[first:last]
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, last - first)
     largest = -math.inf
     for h in range(away_m.shape[0]):
         distance = faces[h, 0] * x + faces[h, 1] * y + faces[h, 2] * z + away_m[h]
@@ -64,8 +65,8 @@ def segment_clearance(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     dx = x1 - x0
     dy = y1 - y0
     dz = z1 - z0
-    faces = normals[first:last]
-    away_m = offsets_m[first:last]
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, last - first)
     n_faces = away_m.shape[0]
     height = -math.inf
     slope = 0.0
@@ -117,8 +118,8 @@ def segment_meets(normals, offsets_m, first, last, inflation_m, x0, y0, z0, x1, 
     Returns:
         True where some point of the segment is closer than `inflation_m`.
     """
-    faces = normals[first:last]
-    away_m = offsets_m[first:last]
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, last - first)
     enters = 0.0
     leaves = 1.0
     for h in range(away_m.shape[0]):

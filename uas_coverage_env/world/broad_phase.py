@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.compiled.views import slice_view
 
 BLOCK = 64
 """So many obstacles are looked at at once; kernels take more in several turns."""
@@ -83,14 +84,14 @@ def write_lower_bounds(columns, first, n, x0, y0, z0, x1, y1, z1, bound_m):
     x_low, x_high = min(x0, x1), max(x0, x1)
     y_low, y_high = min(y0, y1), max(y0, y1)
     z_low, z_high = min(z0, z1), max(z0, z1)
-    middle_x = columns[MIDDLE, first : first + n]
-    middle_y = columns[MIDDLE + 1, first : first + n]
-    middle_z = columns[MIDDLE + 2, first : first + n]
-    per_half_x = columns[PER_HALF, first : first + n]
-    per_half_y = columns[PER_HALF + 1, first : first + n]
-    per_half_z = columns[PER_HALF + 2, first : first + n]
-    near_m = columns[NEAR, first : first + n]
-    rise_m = columns[RISE, first : first + n]
+    middle_x = slice_view(columns[MIDDLE], first, n)
+    middle_y = slice_view(columns[MIDDLE + 1], first, n)
+    middle_z = slice_view(columns[MIDDLE + 2], first, n)
+    per_half_x = slice_view(columns[PER_HALF], first, n)
+    per_half_y = slice_view(columns[PER_HALF + 1], first, n)
+    per_half_z = slice_view(columns[PER_HALF + 2], first, n)
+    near_m = slice_view(columns[NEAR], first, n)
+    rise_m = slice_view(columns[RISE], first, n)
     for o in range(n):
         times = max(0.0, halves_away(x_low, x_high, middle_x[o], per_half_x[o]))
         times = max(times, halves_away(y_low, y_high, middle_y[o], per_half_y[o]))
@@ -109,12 +110,12 @@ def write_meetings(columns, box, first, n, x0, y0, z0, x1, y1, z1, meets):
     x_low, x_high = min(x0, x1), max(x0, x1)
     y_low, y_high = min(y0, y1), max(y0, y1)
     z_low, z_high = min(z0, z1), max(z0, z1)
-    lower_x = columns[box, first : first + n]
-    lower_y = columns[box + 1, first : first + n]
-    lower_z = columns[box + 2, first : first + n]
-    upper_x = columns[box + 3, first : first + n]
-    upper_y = columns[box + 4, first : first + n]
-    upper_z = columns[box + 5, first : first + n]
+    lower_x = slice_view(columns[box], first, n)
+    lower_y = slice_view(columns[box + 1], first, n)
+    lower_z = slice_view(columns[box + 2], first, n)
+    upper_x = slice_view(columns[box + 3], first, n)
+    upper_y = slice_view(columns[box + 4], first, n)
+    upper_z = slice_view(columns[box + 5], first, n)
     for o in range(n):
         beyond = max(lower_x[o] - x_high, x_low - upper_x[o])
         beyond = max(beyond, max(lower_y[o] - y_high, y_low - upper_y[o]))

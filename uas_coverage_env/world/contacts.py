@@ -3,6 +3,7 @@
 import math
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, stack_array
+from uas_coverage_env.compiled.views import rows_view
 from uas_coverage_env.entities.commands import WRENCH
 from uas_coverage_env.entities.outcome import (
     BATTERY,
@@ -37,8 +38,8 @@ from uas_coverage_env.world.routes import box_apart
 @kernel
 def face_between(normals, offsets_m, first, last, x0, y0, z0, x1, y1, z1):
     """A lower bound of the clearance of a segment: the face that both ends are farthest from."""
-    faces = normals[first:last]
-    away_m = offsets_m[first:last]
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, last - first)
     largest = -math.inf
     for h in range(away_m.shape[0]):
         n0 = faces[h, 0]

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.blocks import numbered
 from uas_coverage_env.env.observation import Feature, Group
+from uas_coverage_env.files.blocks import numbered
 from uas_coverage_env.planning.reserves import LEARNED_LEG
 
 LAYOUT = "waypoint_v1"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.blocks import check_parameters
+from uas_coverage_env.files.blocks import check_parameters
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
 

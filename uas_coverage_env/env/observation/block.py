@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from uas_coverage_env.compiled.blocks import check_parameters, numbered
+from uas_coverage_env.files.blocks import check_parameters, numbered
 
 
 @dataclass(frozen=True)

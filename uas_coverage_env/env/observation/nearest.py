@@ -8,6 +8,7 @@ from scipy.spatial import KDTree
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, lowest_bit, stack_array
 from uas_coverage_env.compiled.memory import record_dtype
+from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.env.observation.relative import close
 from uas_coverage_env.env.observation.scales import DENSEST, DENSITY_M, K_WAYPOINTS
 from uas_coverage_env.env.observation.sorted_list import insert
@@ -107,10 +108,10 @@ def nearest_waypoints(arena, state, i, candidates):
         n = min(_WORD, n_waypoints - first)
         limit_m2 = away_m2[K_WAYPOINTS - 1] if found == K_WAYPOINTS else math.inf
         bits = _open_within(
-            columns[NORTH_M, first : first + n],
-            columns[EAST_M, first : first + n],
-            columns[DOWN_M, first : first + n],
-            uncovered[first : first + n], x, y, z, limit_m2,
+            slice_view(columns[NORTH_M], first, n),
+            slice_view(columns[EAST_M], first, n),
+            slice_view(columns[DOWN_M], first, n),
+            slice_view(uncovered, first, n), x, y, z, limit_m2,
         )  # fmt: skip
         held = 0
         for c in range(found):

@@ -1,6 +1,7 @@
 """Where the weight of the open waypoints lies."""
 
 from uas_coverage_env.compiled.kernels import counting_kernel, inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import FAR_M
@@ -79,11 +80,11 @@ def _open_weight(arena, state, i, sums):
     n = state.uncovered.shape[0]
     columns = arena.waypoint_columns
     _add_open(
-        columns[NORTH_M, :n],
-        columns[EAST_M, :n],
-        columns[SHARE, :n],
-        columns[SHARE_NORTH, :n],
-        columns[SHARE_EAST, :n],
+        slice_view(columns[NORTH_M], 0, n),
+        slice_view(columns[EAST_M], 0, n),
+        slice_view(columns[SHARE], 0, n),
+        slice_view(columns[SHARE_NORTH], 0, n),
+        slice_view(columns[SHARE_EAST], 0, n),
         state.uncovered, state.x[i, X], state.x[i, Y], sums,
     )  # fmt: skip
     left = 0.0

@@ -3,6 +3,7 @@
 import math
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.views import rows_view, slice_view
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, N_RAYS, RAY_M
@@ -58,8 +59,8 @@ _N, _NE, _E, _SE, _S, _SW, _W, _NW, _UP, _DOWN = range(N_RAYS)
 @kernel
 def _ray_to_hull(normals, offsets_m, first, last, x, y, z, dx, dy, dz, free_m):
     """How far a ray goes before it enters a hull, at most free_m."""
-    faces = normals[first:last]
-    away_m = offsets_m[first:last]
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, last - first)
     enters_m = 0.0
     leaves_m = free_m
     misses = False
@@ -112,8 +113,8 @@ def _both_ways(inside_m, slope, free_m, ahead, behind):
 @inlined_kernel
 def _rays_to_fence(normals, offsets_m, first, last, x, y, z, free_m):
     """Write how far the rays go before they leave the fence; returns how far away that is."""
-    faces = normals[first:last]
-    away_m = offsets_m[first:last]
+    faces = rows_view(normals, first, (last - first, 3))
+    away_m = rows_view(offsets_m, first, last - first)
     for ray in range(N_RAYS):
         free_m[ray] = RAY_M
     outermost = -math.inf
@@ -202,12 +203,12 @@ def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
             box as its walls.
         in_reach: (n or more,) written: 1 where a ray may meet its hull's box, 0 elsewhere.
     """
-    middle_x = columns[MIDDLE, first : first + n]
-    middle_y = columns[MIDDLE + 1, first : first + n]
-    middle_z = columns[MIDDLE + 2, first : first + n]
-    per_half_x = columns[PER_HALF, first : first + n]
-    per_half_y = columns[PER_HALF + 1, first : first + n]
-    per_half_z = columns[PER_HALF + 2, first : first + n]
+    middle_x = slice_view(columns[MIDDLE], first, n)
+    middle_y = slice_view(columns[MIDDLE + 1], first, n)
+    middle_z = slice_view(columns[MIDDLE + 2], first, n)
+    per_half_x = slice_view(columns[PER_HALF], first, n)
+    per_half_y = slice_view(columns[PER_HALF + 1], first, n)
+    per_half_z = slice_view(columns[PER_HALF + 2], first, n)
     for o in range(n):
         beyond[o] = max(
             halves_away(x, x, middle_x[o], per_half_x[o]),
@@ -216,12 +217,12 @@ def _look_for_obstacles(columns, first, n, x, y, z, beyond, in_reach):
         )
     # a loop of its own: of one that reads all twelve columns the compiler thinks, for less than
     # twenty obstacles, that vector instructions would not pay
-    hull_x = columns[HULL_MIDDLE, first : first + n]
-    hull_y = columns[HULL_MIDDLE + 1, first : first + n]
-    hull_z = columns[HULL_MIDDLE + 2, first : first + n]
-    half_x = columns[HULL_HALF, first : first + n]
-    half_y = columns[HULL_HALF + 1, first : first + n]
-    half_z = columns[HULL_HALF + 2, first : first + n]
+    hull_x = slice_view(columns[HULL_MIDDLE], first, n)
+    hull_y = slice_view(columns[HULL_MIDDLE + 1], first, n)
+    hull_z = slice_view(columns[HULL_MIDDLE + 2], first, n)
+    half_x = slice_view(columns[HULL_HALF], first, n)
+    half_y = slice_view(columns[HULL_HALF + 1], first, n)
+    half_z = slice_view(columns[HULL_HALF + 2], first, n)
     for o in range(n):
         north_m = hull_x[o] - x
         east_m = hull_y[o] - y

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.blocks import check_parameters
+from uas_coverage_env.files.blocks import check_parameters
 
 LARGEST_WEIGHT = 1e9
 """No reward weight is larger: the sum of a mission stays far from the end of the numbers."""
