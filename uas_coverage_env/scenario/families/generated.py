@@ -15,7 +15,7 @@ Only 5 can fail for a random draw; then the next draw has fuller batteries.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,27 +73,20 @@ _LARGEST = {"n_uas": 128, "n_waypoints": 5000, "n_obstacles": 400}
 _LARGEST_MIN_HEIGHT_M = 10.0  # there is as much room between the highest roof and the ceiling
 
 
-@dataclass(frozen=True)
-class _Town:
-    """The area: starts in a strip in the west, blocks and waypoints east of it.
-
-    Attributes:
-        north_m: Extent to the north [m].
-        west_m: Width of the strip that the starts take [m].
-        east_m: Extent of the town east of it [m].
-        rows: Rows of the grid of waypoints, south to north.
-        columns: Its columns, west to east.
-    """
+class _Town(NamedTuple):
+    """The area: starts in a strip in the west, blocks and waypoints east of it."""
 
     north_m: float
     west_m: float
+    """Width of the strip."""
     east_m: float
+    """Extent of the town east of it."""
     rows: int
+    """Of the grid of waypoints, south to north."""
     columns: int
 
 
-@dataclass(frozen=True)
-class _Block:
+class _Block(NamedTuple):
     """A box on the ground: [north_0, north_1] x [east_0, east_1] x [0, height] [m]."""
 
     north_m: tuple[float, float]
@@ -183,18 +176,10 @@ def sample_scenario(
     min_height_m: float = MIN_HEIGHT_M,
     disturbances: str | None = None,
 ) -> Scenario:
-    """The town of a seed, with counts that the seed draws.
-
-    Args:
-        seed: From 0 on.
-        n_uas: Least and most.
-        n_waypoints: Least and most.
-        n_obstacles: Least and most.
-        min_height_m: See `generate_scenario`.
-        disturbances: Likewise.
+    """The town of a seed, from 0 on, which draws the counts; the rest as of `GeneratedScenarios`.
 
     Raises:
-        ValueError: See `GeneratedScenarios` and `generate_scenario`.
+        ValueError: See there and `generate_scenario`.
     """
     ranges = n_uas, n_waypoints, n_obstacles
     return GeneratedScenarios(*ranges, min_height_m, disturbances).of_seed(seed)

@@ -1,6 +1,6 @@
 """Low charge: streets and blocks whose batteries do not suffice for all waypoints."""
 
-from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.scenario.feasibility import back_and_forth
 from uas_coverage_env.scenario.families.family import Family
 from uas_coverage_env.scenario.families.site import Rng, Size
 from uas_coverage_env.scenario.families.streets import streets

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.scenario.feasibility import back_and_forth
 from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
