@@ -1,4 +1,4 @@
-"""Moving obstacles that matter: they cross the area at the height of the waypoints."""
+"""Traffic: two to four moving obstacles fly to and fro at the height of the waypoints."""
 
 import numpy as np
 
