@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from shapely.geometry import Point, Polygon
 
-from uas_coverage_env.draw.legend import in_words
+from uas_coverage_env.draw.signs import in_words
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.files.suggestions import check_choice
