@@ -19,6 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from families_picture import families_table
 from gymnasium import spaces
 
 from uas_coverage_env import load_scenario, uas_coverage_v0
@@ -38,7 +39,6 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight import Why
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.scenario.events import EVENT_KINDS
-from uas_coverage_env.scenario.families import BUILT_IN, Family
 from uas_coverage_env.scenario.schema import scenario_schema
 
 DOCS = Path(__file__).resolve().parent
@@ -356,16 +356,6 @@ def of_operations(module: str, name: str) -> Callable[[], str]:
     return made
 
 
-def families() -> str:
-    """The families of scenarios that take a size, with the difficulty that their modules name."""
-    sized = {name: family for name, family in BUILT_IN.items() if isinstance(family, Family)}
-    rows = []
-    for name, family in sized.items():
-        says = (importlib.import_module(family.draw.__module__).__doc__ or "").splitlines()[0]
-        rows.append((f"`{name}`", says.partition(": ")[2].removesuffix(".")))
-    return table(("family", "its difficulty"), rows)
-
-
 PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
@@ -383,7 +373,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "arguments": arguments,
     "scenario_fields": scenario_fields,
     "event_fields": event_fields,
-    "families": families,
+    "families": families_table,
     "planners": planners,
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
     **{name: of_operations(room, name) for room, names in OPERATIONS.items() for name in names},
