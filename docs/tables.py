@@ -407,15 +407,13 @@ def renewed(text: str) -> str:
 
 def renewed_files() -> dict[Path, str]:
     """What every file with something generated in it should hold."""
-    root = DOCS.parent
-    pages = [*sorted(DOCS.glob("*.md")), *(root / name for name in _READMES)]
+    pages = [*sorted(DOCS.glob("*.md")), *(DOCS.parent / name for name in _READMES)]
     files = {}
     for page in pages:
         text = page.read_text(encoding="utf-8")
         if "<!-- generated: " in text:
             files[page] = renewed(text)
-    schema = json.dumps(scenario_schema(), indent=2, ensure_ascii=False)
-    return {**files, SCHEMA: schema + "\n"}
+    return {**files, SCHEMA: json.dumps(scenario_schema(), indent=2, ensure_ascii=False) + "\n"}
 
 
 _READMES = ("README.md", "baselines/README.md", "agents/README.md", "benchmarks/README.md")
