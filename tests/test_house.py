@@ -336,7 +336,7 @@ def test_the_wheel_holds_every_module_and_data_file(wheel):
         f"{package}/{path.relative_to(folder).as_posix()}"
         for package, folder in PACKAGES.items()
         for path in folder.rglob("*")
-        if path.suffix in {".py", ".toml", ".typed", ".safetensors", ".js", ".css", ".csv"}
+        if path.suffix in {".py", ".toml", ".typed", ".safetensors", ".js", ".css", ".csv", ".zip"}
     }
     assert wanted <= names
     assert "uas_coverage_env/scenario/village.toml" in names

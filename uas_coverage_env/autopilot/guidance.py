@@ -8,7 +8,7 @@ from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.autopilot.low_way import low_way
 from uas_coverage_env.autopilot.way_out import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
-from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel, kernel, rare_kernel
 from uas_coverage_env.geometry import signed_distance
 from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.commands import GO_TO, HOME, VELOCITY
@@ -184,11 +184,17 @@ def _altitude(arena, i, x, altitude1_m, way_m, needed_m):
     return min(max(altitude_m, floor_m), max(rules.ceiling_m, altitude1_m))
 
 
-@kernel
+@rare_kernel  # in one copy: guidance is a good part of a first start
 def _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, belief):
     """Whether a command, and braking after it, keeps clear of fence and fixed obstacles."""
     n_flown, slack_m = fly_and_brake(arena, i, x, reference, command, nonlinear, path_m, belief)
     return fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m) >= 0.0
+
+
+@rare_kernel
+def _brake(arena, i, x, reference, nonlinear, path_m, belief):
+    """Write the path on which UAS i would come to rest."""
+    fly_and_brake(arena, i, x, reference, arena.rules[0].brake, nonlinear, path_m, belief)
 
 
 @allocating_kernel
@@ -240,7 +246,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
     path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
     brakes_late = _brakes_late(arena, i, belief, target, leg)
     if brakes_late:
-        fly_and_brake(arena, i, x, reference, arena.rules[0].brake, nonlinear, path_m, belief)
+        _brake(arena, i, x, reference, nonlinear, path_m, belief)
         ahead_x, ahead_y = end_x - path_m[-1, X], end_y - path_m[-1, Y]
     distance_m = math.hypot(ahead_x, ahead_y)
     needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, -z1, leg)

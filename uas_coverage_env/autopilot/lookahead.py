@@ -4,7 +4,7 @@ import math
 
 from uas_coverage_env.autopilot.belief import believed_kinematics, believed_wrench
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, stack_array
 from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
 from uas_coverage_env.vehicle import (
     N_INPUTS,
@@ -60,7 +60,7 @@ def _kept_m(required_m, now_m):
     return min(required_m, now_m - TOLERANCE_M)
 
 
-@kernel
+@rare_kernel
 def _fly_as_believed(vehicle, belief, x, governed, command, nonlinear, u):
     """Fly a command for a step in the disturbances believed in."""
     believed_wrench(vehicle, belief, x, governed, command, u)

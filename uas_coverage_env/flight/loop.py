@@ -30,7 +30,7 @@ from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
 from uas_coverage_env.vehicle import Z
-from uas_coverage_env.world import FLYING, LANDED, Command, SwarmState, Velocity, pack
+from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Velocity, pack
 from uas_coverage_env.world.packs import swaps_alone
 
 _RECORDED_PACKAGES = (
@@ -199,8 +199,10 @@ def _make_ready(
 ) -> None:
     """Compile what world and planner begin with, then put both at the start."""
     state = world.swarm_state()
-    hover = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
-    packed = pack(hover, state.names, state.active, len(state.uncovered))
+    stay: dict[str, Command] = dict.fromkeys(state.names, GoTo(None))
+    if not getattr(planner, "goes_to", False):
+        stay = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
+    packed = pack(stay, state.names, state.active, len(state.uncovered))
     meter.terms(packed, _stepped(world, packed))
     world.reset()
     warm_up = getattr(planner, "warm_up", None)
