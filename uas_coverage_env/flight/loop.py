@@ -91,7 +91,7 @@ def rollout(
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
         disturbances: What pushes back; None: what the scenario says. Others than those of the
             scenario are named in the record, but no flight directory holds what they do.
-        reward: Terms of the reward that is recorded, see `RewardTerm`.
+        reward: Terms of the reward that is recorded, see `RewardTerm`; empty: none is.
         reward_weights: Mapping from reward term to weight; the other terms keep theirs.
         on_step: Called with a `Progress` once all is compiled and after every step.
         should_stop: Asked before every decision.
@@ -135,7 +135,7 @@ def rollout(
             judges_wrenches=getattr(planner, "is_learner", False),
             seed=seed,
         )
-        meter = RewardMeter(world, reward, reward_weights)
+        meter = RewardMeter(world, reward, reward_weights) if reward or reward_weights else None
         _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
@@ -195,7 +195,7 @@ def _is_uncertain(scenario: Scenario, disturbances: Sequence[Disturbance] | None
 
 
 def _make_ready(
-    world: World, meter: RewardMeter, planner: Planner, brief: MissionBrief, seed: int
+    world: World, meter: RewardMeter | None, planner: Planner, brief: MissionBrief, seed: int
 ) -> None:
     """Compile what world and planner begin with, then put both at the start."""
     state = world.swarm_state()
@@ -203,7 +203,9 @@ def _make_ready(
     if not getattr(planner, "goes_to", False):
         stay = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
     packed = pack(stay, state.names, state.active, len(state.uncovered))
-    meter.terms(packed, _stepped(world, packed))
+    outcome = _stepped(world, packed)
+    if meter is not None:
+        meter.terms(packed, outcome)
     world.reset()
     warm_up = getattr(planner, "warm_up", None)
     try:
