@@ -3,7 +3,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from uas_coverage_env.flight import DecisionRecord, accomplished, coverage, energy_Wh, home, summary
+from uas_coverage_env.flight import (
+    DecisionRecord,
+    Flight,
+    accomplished,
+    coverage,
+    energy_Wh,
+    home,
+    rollout,
+    summary,
+)
 from uas_coverage_env.flight.record import LANDED, LOST
 
 
