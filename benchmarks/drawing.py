@@ -21,10 +21,10 @@ from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.env import CoverageBatch, MissionSettings
 from uas_coverage_env.env.episode import Episode
 from uas_coverage_env.env.memory import TABLES
-from uas_coverage_env.scenario import FAMILIES, Scenario
+from uas_coverage_env.scenario import GeneratedScenarios, Scenario
 from uas_coverage_env.world.arena import ARENA
 
-FAMILY = FAMILIES["generated"]
+FAMILY = GeneratedScenarios()
 
 
 def milliseconds(work: Callable[[], object]) -> float:

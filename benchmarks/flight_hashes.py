@@ -34,9 +34,11 @@ from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.scenario import with_disturbances
-from uas_coverage_env.scenario.families import BUILT_IN
 
-SERIES = ("generated", "generated-light", *BUILT_IN)
+SERIES = (
+    "generated", "generated-light", "open-field", "streets", "courtyards", "walls", "river",
+    "irregular", "traffic", "low-charge",
+)  # fmt: skip
 SEEDS = range(5_000, 5_020)
 _DRAWN_STEPS = 60
 _BATCH, _BATCH_STEPS = 64, 100

@@ -19,6 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from families_picture import families_table
 from gymnasium import spaces
 
 from uas_coverage_env import load_scenario, uas_coverage_v0
@@ -372,6 +373,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "arguments": arguments,
     "scenario_fields": scenario_fields,
     "event_fields": event_fields,
+    "families": families_table,
     "planners": planners,
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
     **{name: of_operations(room, name) for room, names in OPERATIONS.items() for name in names},
@@ -405,15 +407,13 @@ def renewed(text: str) -> str:
 
 def renewed_files() -> dict[Path, str]:
     """What every file with something generated in it should hold."""
-    root = DOCS.parent
-    pages = [*sorted(DOCS.glob("*.md")), *(root / name for name in _READMES)]
+    pages = [*sorted(DOCS.glob("*.md")), *(DOCS.parent / name for name in _READMES)]
     files = {}
     for page in pages:
         text = page.read_text(encoding="utf-8")
         if "<!-- generated: " in text:
             files[page] = renewed(text)
-    schema = json.dumps(scenario_schema(), indent=2, ensure_ascii=False)
-    return {**files, SCHEMA: schema + "\n"}
+    return {**files, SCHEMA: json.dumps(scenario_schema(), indent=2, ensure_ascii=False) + "\n"}
 
 
 _READMES = ("README.md", "baselines/README.md", "agents/README.md", "benchmarks/README.md")

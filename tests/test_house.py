@@ -79,6 +79,36 @@ def _nodes(*folders: Path) -> Iterator[tuple[Path, ast.AST]]:
                 yield path, node
 
 
+def _names_bound(init: Path) -> set[str]:
+    """What an `__init__` binds, but for modules that it imports as such."""
+    bound: set[str] = set()
+    for node in ast.parse(init.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            modules = {path.stem for path in init.parent.glob("*.py")}
+            of_itself = node.module is None or node.module.endswith(f".{init.parent.name}")
+            names = {alias.asname or alias.name for alias in node.names}
+            bound |= names - modules if of_itself else names
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            bound.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            bound |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return bound
+
+
+def test_no_module_is_hidden_by_what_its_package_calls_by_the_same_name():
+    # `import package.module` would give the function, and `patch("package.module.x")` find no x
+    hidden = [
+        f"{module.relative_to(ROOT)}: {init.name}"
+        for folder in PACKAGES.values()
+        for init in (*folder.rglob("__init__.py"), *folder.rglob("__init__.pyi"))
+        for name in _names_bound(init)
+        for module in (init.parent / f"{name}.py", init.parent / name / "__init__.py")
+        if module.exists()
+    ]
+    assert hidden == []
+
+
 def test_no_function_takes_more_than_12_parameters():
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}: {n}"
@@ -306,7 +336,7 @@ def test_the_wheel_holds_every_module_and_data_file(wheel):
         f"{package}/{path.relative_to(folder).as_posix()}"
         for package, folder in PACKAGES.items()
         for path in folder.rglob("*")
-        if path.suffix in {".py", ".toml", ".typed", ".safetensors", ".js", ".css", ".csv"}
+        if path.suffix in {".py", ".toml", ".typed", ".safetensors", ".js", ".css", ".csv", ".zip"}
     }
     assert wanted <= names
     assert "uas_coverage_env/scenario/village.toml" in names

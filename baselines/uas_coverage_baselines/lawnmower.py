@@ -24,6 +24,7 @@ class Lawnmower:
 
     Options = AssistedOptions
     comes_home_by_legs = True
+    goes_to = True
 
     def __init__(self, options: AssistedOptions | None = None) -> None:
         self.options = options or AssistedOptions()

@@ -12,6 +12,7 @@ class NearestWaypoint:
     """Flies each UAS to the nearest open waypoint that no other UAS flies to; home in the end."""
 
     Options = AssistedOptions
+    goes_to = True
 
     def __init__(self, options: AssistedOptions | None = None) -> None:
         self.options = options or AssistedOptions()

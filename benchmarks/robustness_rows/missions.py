@@ -11,7 +11,7 @@ from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, s
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.flight import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.scenario import sample_scenario
-from uas_coverage_env.scenario.family import N_OBSTACLES, N_UAS, N_WAYPOINTS
+from uas_coverage_env.scenario.families.generated import N_OBSTACLES, N_UAS, N_WAYPOINTS
 
 LEVELS = ("still", "light", "moderate", "strong")
 FIRST_SEED = 3000

@@ -10,10 +10,11 @@ from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.cli import demo as demo_command
 from uas_coverage_env.cli import main
 from uas_coverage_env.cli.figures_of_flight import verdict
-from uas_coverage_env.flight import Flight, load_planner, rollout, summary
+from uas_coverage_env.flight import Flight, accomplished, load_planner, rollout, summary
 from uas_coverage_env.scenario import generate_scenario
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
+PAGES = ("recorded", "replay")
 
 
 @pytest.fixture(scope="module")
@@ -127,12 +128,18 @@ def test_the_demo_flies_and_opens_its_page_where_there_is_a_browser(elsewhere, c
     assert main(["demo"]) == 0
     page = elsewhere / "flights" / "demo" / "replay.html"
     assert page.stat().st_size > 500_000
-    assert Flight.load(page.parent).covered[-1] == 49
+    flight = Flight.load(page.parent)
+    assert flight.scenario.name == "corridor"
+    assert accomplished(flight)
+    assert summary(flight)["breaches"] == 0
     assert opened == [], "there is no screen"
-    assert "to look at it, open flights/demo/replay.html" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    recorded, flown = (out.index(f"to look at it, open flights/demo/{name}.html") for name in PAGES)
+    assert out.index("recorded flight of trajectory in the village") < recorded < flown
+    assert "trajectory (recorded)" in (page.parent / "recorded.html").read_text()
 
     monkeypatch.setenv("DISPLAY", ":9")
     assert main(["demo", "--no-open"]) == 0
     assert opened == []
     assert main(["demo", "--out", "mine"]) == 0
-    assert opened == [(elsewhere / "mine" / "replay.html").as_uri()]
+    assert opened == [(elsewhere / "mine" / f"{name}.html").as_uri() for name in PAGES]

@@ -16,7 +16,7 @@ from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.env import CoverageBatch, CoverageSwarmEnv, CoverageVectorEnv, ScenarioPool
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.scenario_sets import SETS
-from uas_coverage_env.scenario import FAMILIES, GeneratedScenarios, MissionSource
+from uas_coverage_env.scenario import GeneratedScenarios, MissionSource
 
 ID = "UASCoverage-v0"
 SMALL = GeneratedScenarios(n_uas=(1, 3), n_waypoints=(4, 9), n_obstacles=(0, 3))
@@ -391,7 +391,7 @@ def test_a_pool_holds_scenarios_and_nothing_that_draws_them():
 
 
 def test_families_never_draw_what_planners_are_compared_on():
-    scenario = FAMILIES["generated"](np.random.default_rng(0))
+    scenario = GeneratedScenarios()(np.random.default_rng(0))
     seed = int(scenario.name.split("-")[1][1:])
     assert seed > max(max(seeds) for seeds in SETS.values())
 

@@ -11,11 +11,10 @@ from uas_coverage_env.env import CoverageVectorEnv
 from uas_coverage_env.features import disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import (
-    FAMILIES,
     LEVELS,
-    SERIES,
     GeneratedScenarios,
     Uncertainty,
+    installed_families,
     sample_scenario,
     with_disturbances,
 )
@@ -165,11 +164,12 @@ def test_a_level_changes_the_air_and_the_vehicles_of_a_town_and_nothing_else():
     assert with_disturbances(still, None, 3) is still
 
 
-def test_families_and_series_have_the_levels_by_name():
+def test_generated_scenarios_have_the_levels_by_name():
     for name in LEVELS:
-        assert FAMILIES[f"generated-{name}"] == GeneratedScenarios(disturbances=name)
-        assert SERIES[f"generated-{name}"](5) == sample_scenario(5, disturbances=name)
-        assert SERIES[f"generated-{name}"](5).name == f"{sample_scenario(5).name}-{name}"
+        family = installed_families()[f"generated-{name}"]
+        assert family == GeneratedScenarios(disturbances=name)
+        assert family.of_seed(5) == sample_scenario(5, disturbances=name)
+        assert family.of_seed(5).name == f"{sample_scenario(5).name}-{name}"
 
 
 def test_a_level_that_there_is_not_is_one_line():

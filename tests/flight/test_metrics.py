@@ -3,7 +3,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from uas_coverage_env.flight import DecisionRecord, accomplished, coverage, energy_Wh, home, summary
+from uas_coverage_env.flight import (
+    DecisionRecord,
+    Flight,
+    accomplished,
+    coverage,
+    energy_Wh,
+    home,
+    rollout,
+    summary,
+)
 from uas_coverage_env.flight.record import LANDED, LOST
 
 
@@ -58,3 +67,11 @@ def test_percentiles_are_those_of_the_decisions(flight):
     )
     assert result["fallbacks"] == 3
     assert result["mip_gap_p50"] == pytest.approx(5.0)
+
+
+def test_a_flight_that_was_asked_for_no_terms_keeps_no_reward(tmp_path):
+    flight = rollout("open_field", "hover", max_steps=2, reward=())
+    assert flight.reward_terms is None
+    assert "return" not in summary(flight)
+    assert not (flight.save(tmp_path) / "rewards.csv").exists()
+    assert Flight.load(tmp_path).reward_terms is None

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.flight import (
     MODES,
@@ -290,21 +289,6 @@ def test_decision_time_is_that_of_the_planner_alone(yard):
     assert min(durations_s) >= 0.02
     # told three times: before the first step and after both
     assert sum(durations_s) <= flight.wall_time_s - 0.6
-
-
-def test_neither_a_decision_nor_the_flight_pays_for_what_is_compiled_on_the_way(yard):
-    planner: Any = Still()
-
-    def act(swarm):
-        with COMPILATIONS.one(lambda: 1):
-            COMPILATIONS.begun()
-            time.sleep(0.2)
-        return {name: GoTo(None) for name in swarm.active}
-
-    planner.act = act
-    flight = rollout(yard, planner, max_steps=2)
-    assert max(decision.duration_s for decision in flight.decisions) < 0.1
-    assert flight.wall_time_s < 0.2
 
 
 def test_what_a_planner_tells_about_its_decisions_is_kept(yard):

@@ -26,7 +26,7 @@ from uas_coverage_baselines.milp_mpc.solvers import (
 
 from uas_coverage_env import InputError
 from uas_coverage_env.cli import main
-from uas_coverage_env.flight.rollout import recorded_versions
+from uas_coverage_env.flight.loop import recorded_versions
 
 PACKAGES = {"highs": "highspy", "scip": "pyscipopt", "gurobi": "gurobipy"}
 

@@ -9,18 +9,25 @@ import pytest
 from uas_coverage_env import evaluate
 from uas_coverage_env.env import CoverageParallelEnv
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.scenario import SERIES, Family, Size, installed_families, warnings
+from uas_coverage_env.scenario import (
+    Family,
+    MissionSource,
+    Size,
+    installed_families,
+    load_scenario,
+    warnings,
+)
 from uas_coverage_env.scenario import families as package
-from uas_coverage_env.scenario.families import BUILT_IN
 from uas_coverage_env.scenario.families.open_field import open_field
 from uas_coverage_env.scenario.families.site import CLEARANCE_M, GAP_M
 
-SUFFICIENT = [name for name in BUILT_IN if name != "low-charge"]
+SIZED = [name for name, family in package.BUILT_IN.items() if isinstance(family, Family)]
+SUFFICIENT = [name for name in SIZED if name != "low-charge"]
 SMALL = {"n_uas": (1, 3), "n_waypoints": (6, 12)}
 
 
 def drawn(name, seed, **size):
-    return BUILT_IN[name].sized(**(size or SMALL)).of_seed(seed)
+    return package.BUILT_IN[name].sized(**(size or SMALL)).of_seed(seed)
 
 
 def clearances(scenario, points):
@@ -38,7 +45,7 @@ def test_nothing_is_doubtful_about_a_draw(name):
         assert 6 <= len(scenario.waypoints) <= 12
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize("name", SIZED)
 def test_centres_and_starts_keep_all_distances(name):
     for seed in range(6):
         scenario = drawn(name, seed)
@@ -49,7 +56,7 @@ def test_centres_and_starts_keep_all_distances(name):
         assert scenario.fence.signed_distance(centres).max() < -1.4
 
 
-@pytest.mark.parametrize("name", [name for name in BUILT_IN if name != "walls"])
+@pytest.mark.parametrize("name", [name for name in SIZED if name != "walls"])
 def test_every_centre_has_a_free_way_up(name):
     scenario = drawn(name, 3)
     top_m = max((-hull.vertices_m[:, 2].min() for hull in scenario.hulls), default=0.0)
@@ -112,7 +119,7 @@ def test_the_charge_of_low_charge_does_not_suffice():
         assert any("batteries will hardly finish" in line for line in warnings(scenario))
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize("name", SIZED)
 def test_a_seed_gives_the_same_scenario_and_another_seed_another(name):
     assert drawn(name, 5) == drawn(name, 5)
     assert drawn(name, 5).waypoints != drawn(name, 6).waypoints
@@ -120,7 +127,7 @@ def test_a_seed_gives_the_same_scenario_and_another_seed_another(name):
 
 @pytest.mark.parametrize("name", ["streets", "courtyards", "walls"])
 def test_nearest_waypoint_covers_a_draw_and_comes_home(name):
-    family = BUILT_IN[name].sized(n_uas=(2, 2), n_waypoints=(8, 8))
+    family = package.BUILT_IN[name].sized(n_uas=(2, 2), n_waypoints=(8, 8))
     (episode,) = evaluate("nearest-waypoint", family, seeds=[1]).episodes
     assert episode.accomplished
 
@@ -128,7 +135,7 @@ def test_nearest_waypoint_covers_a_draw_and_comes_home(name):
 def test_an_environment_and_the_command_line_draw_the_same():
     env = CoverageParallelEnv("river", max_cycles=2)
     env.reset(seed=4)
-    assert env.scenario.name == SERIES["river"](4).name
+    assert env.scenario.name == load_scenario("river:4").name
 
 
 def test_a_family_of_ones_own_is_announced_by_an_entry_point(monkeypatch):
@@ -145,6 +152,27 @@ def test_a_family_of_ones_own_is_announced_by_an_entry_point(monkeypatch):
     env = CoverageParallelEnv("mine", max_cycles=2)
     env.reset(seed=0)
     assert len(env.scenario.waypoints) == 3
+    assert load_scenario("mine:0").waypoints == env.scenario.waypoints
+
+
+def test_a_family_is_a_file_in_the_folder_and_nothing_else(monkeypatch, tmp_path):
+    (tmp_path / "pond.py").write_text(
+        "from uas_coverage_env.scenario.families.family import Family\n"
+        "from uas_coverage_env.scenario.families.open_field import open_field\n"
+        "FAMILIES = {'pond': Family(open_field)}\n"
+    )
+    monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
+    found = package._found()
+    assert [*found] == [*package.BUILT_IN, "pond"]
+    monkeypatch.setattr(package, "BUILT_IN", found)
+    assert load_scenario("pond:3") == load_scenario("open-field:3")
+
+
+@pytest.mark.parametrize("name", installed_families())
+def test_an_environment_flies_every_family_and_has_room_for_what_it_draws(name):
+    source = MissionSource.of(name)
+    drawn = [source.draw(np.random.default_rng(seed)) for seed in range(4)]
+    assert len({scenario.name for scenario in drawn}) == 4
 
 
 def test_a_family_that_cannot_be_loaded_says_so_when_it_is_asked_for_and_harms_no_other(

@@ -6,7 +6,7 @@ import pytest
 
 from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.scenario import Scenario, load_scenario, warnings
-from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.scenario.feasibility import back_and_forth
 
 
 def box(north, east, down):

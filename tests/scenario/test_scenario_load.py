@@ -7,7 +7,7 @@ import pytest
 from uas_coverage_env import rollout
 from uas_coverage_env import scenario as room
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import SERIES, load_scenario, scenario_names, warnings
+from uas_coverage_env.scenario import installed_families, load_scenario, scenario_names, warnings
 
 TEXT = (Path(room.__file__).parent / "open_field.toml").read_text(encoding="utf-8")
 WAYPOINTS = TEXT[TEXT.index("[[waypoints]]") : TEXT.index("# Drawn only")]
@@ -52,8 +52,8 @@ def test_an_unknown_name_lists_what_there_is():
 
 
 def test_a_generated_scenario_has_a_name_and_a_seed():
-    for series, of_seed in SERIES.items():
-        assert load_scenario(f"{series}:5") == of_seed(5)
+    for name, family in installed_families().items():
+        assert load_scenario(f"{name}:5") == family.of_seed(5)
 
 
 def test_a_generated_scenario_is_a_town_too_and_its_seed_may_be_called_one():

@@ -277,6 +277,12 @@ def _leaves_room_to_brake(arena, i, x, reference, nonlinear, command, path_m, be
     return fixed_slack(arena, i, path_m, n_flown, 0.0, slack_m) >= 0.0
 
 
+@rare_kernel
+def _brake(arena, i, x, reference, nonlinear, path_m, belief):
+    """Write the path on which UAS i would come to rest."""
+    fly_and_brake(arena, i, x, reference, arena.rules[0].brake, nonlinear, path_m, belief)
+
+
 @inlined_kernel
 def _write_safe(
     arena, i, x, reference, north_mps, east_mps, altitude_m, leg, nonlinear, command, path_m, belief
@@ -331,7 +337,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
     path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
     brakes_late = _brakes_late(arena, i, belief, target, leg)
     if brakes_late:
-        fly_and_brake(arena, i, x, reference, arena.rules[0].brake, nonlinear, path_m, belief)
+        _brake(arena, i, x, reference, nonlinear, path_m, belief)
         ahead_x, ahead_y = end_x - path_m[-1, S.X], end_y - path_m[-1, S.Y]
     distance_m = math.hypot(ahead_x, ahead_y)
     needed_m, speed_mps = _climb_on_leg(arena, i, x, end_x, end_y, altitude1_m, leg)

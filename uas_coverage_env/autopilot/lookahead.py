@@ -57,7 +57,7 @@ def _kept_m(required_m, now_m):
     return min(required_m, now_m - TOLERANCE_M)
 
 
-@kernel
+@rare_kernel
 def _fly_as_believed(vehicle, belief, x, governed, command, nonlinear, u):
     """Fly a command for a step in the disturbances believed in."""
     believed_wrench(vehicle, belief, x, governed, command, u)

@@ -36,7 +36,7 @@ COMMANDS = (
     CommandEntry(
         "demo",
         at(f"{_CLI}.demo:demo"),
-        "Fly a first mission with a fast planner, and open its replay page in a browser.",
+        "Show a recorded flight, fly a first one, and open the page of each in a browser.",
     ),
     CommandEntry("run", at(f"{_CLI}.run:run"), "Fly one mission and write a flight directory."),
     CommandEntry(

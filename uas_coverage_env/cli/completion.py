@@ -1,12 +1,12 @@
 """What a shell offers to complete arguments with."""
 
 from uas_coverage_env.flight import planner_names
-from uas_coverage_env.scenario import SERIES, scenario_names
+from uas_coverage_env.scenario import installed_families, scenario_names
 
 
 def scenarios(incomplete: str) -> list[str]:
     """Scenarios by name; of those that are generated, all but the seed."""
-    known = (*scenario_names(), *(f"{series}:" for series in SERIES))
+    known = (*scenario_names(), *(f"{family}:" for family in installed_families()))
     return [name for name in known if name.startswith(incomplete)]
 
 

@@ -20,9 +20,9 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.left_open import too_long
 from uas_coverage_env.mission import Access, Errands, MissionBrief
 from uas_coverage_env.scenario import (
-    SERIES,
     Scenario,
     Uas,
+    installed_families,
     load_scenario,
     out_of_reach,
     scenario_names,
@@ -62,7 +62,8 @@ def list_scenarios() -> None:
         )
     out = console()
     out.print(table)
-    out.print(f"by a seed: {', '.join(f'{series}:SEED' for series in SERIES)}", markup=False)
+    by_seed = ", ".join(f"{family}:SEED" for family in installed_families())
+    out.print(f"by a seed: {by_seed}", markup=False)
 
 
 @app.command()

@@ -36,7 +36,7 @@ from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.env.scenes import SceneChanges, SceneLane, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_like, check_values
-from uas_coverage_env.scenario import FAMILIES, Scenario, installed_families
+from uas_coverage_env.scenario import Scenario, installed_families
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
 
@@ -49,8 +49,7 @@ def _check_is_one(scenario: Any) -> None:
     Raises:
         ValueError: It is not one scenario.
     """
-    families = (*FAMILIES, *installed_families())
-    if not isinstance(scenario, str | Path | Scenario) or scenario in families:
+    if not isinstance(scenario, str | Path | Scenario) or scenario in installed_families():
         raise ValueError(
             f"scenario is {str(scenario)[:80]!r}; missions that are drawn do not run on a GPU, "
             "give one scenario, such as generate_scenario(seed=1)"

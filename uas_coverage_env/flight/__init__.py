@@ -5,6 +5,7 @@ from uas_coverage_env.flight.demonstrations import Demonstrations, demonstrate
 from uas_coverage_env.flight.directory import check_directory
 from uas_coverage_env.flight.evaluation import Episode, Evaluation, evaluate
 from uas_coverage_env.flight.flight import Flight
+from uas_coverage_env.flight.loop import Progress, rollout
 from uas_coverage_env.flight.metrics import (
     accomplished,
     coverage,
@@ -45,7 +46,6 @@ from uas_coverage_env.flight.registry import (
     planner_names,
 )
 from uas_coverage_env.flight.rest import rest_of
-from uas_coverage_env.flight.rollout import Progress, rollout
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.flight.seen import (
     SeenGround,

@@ -18,8 +18,8 @@ from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
 from uas_coverage_env.env.observer import Observer
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.flight.loop import Progress, rollout
 from uas_coverage_env.flight.planner import Planner
-from uas_coverage_env.flight.rollout import Progress, rollout
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VX, VY, X, Z

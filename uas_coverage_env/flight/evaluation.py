@@ -9,6 +9,7 @@ import numpy as np
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.loop import rollout
 from uas_coverage_env.flight.metrics import (
     accomplished,
     coverage,
@@ -21,7 +22,6 @@ from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.flight.policy import as_planner
 from uas_coverage_env.flight.record import LOST
 from uas_coverage_env.flight.registry import load_planner
-from uas_coverage_env.flight.rollout import rollout
 from uas_coverage_env.scenario import MissionSource, ScenarioLike
 
 

@@ -57,6 +57,8 @@ class Planner(Protocol):
     - `plans_on_after_swaps`: whether `act` takes in a UAS that flies again with a fresh pack
       (`[sorties]` with `together = false`); otherwise `reset` is called then, as after a change of
       the scene, and both assistants fly along unless the caller says otherwise.
+    - `goes_to`: whether it begins with a `GoTo`: the world's guidance is then compiled before the
+      first decision, otherwise when such a command first comes; neither counts as time of it.
     - `is_learner`: whether its wrenches are judged as those of learners in environments, see
       `docs/rules.md`.
     - `options`: the pydantic model it was made with; goes into the record.

@@ -1,7 +1,7 @@
 """Planners and policies compared on the same scenarios: flown, kept, counted, published."""
 
 from uas_coverage_env.leaderboard.bounds import Bounds, bounds_of
-from uas_coverage_env.leaderboard.machine import machine
+from uas_coverage_env.leaderboard.hardware import machine
 from uas_coverage_env.leaderboard.picture import leaderboard_figure
 from uas_coverage_env.leaderboard.planner_specs import PlannerSpec, planner_specs_of
 from uas_coverage_env.leaderboard.publish import FLIGHTS, Comparison, failures, published, write

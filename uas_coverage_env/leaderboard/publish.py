@@ -14,7 +14,7 @@ from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.bounds import Bounds
-from uas_coverage_env.leaderboard.machine import machine, versions
+from uas_coverage_env.leaderboard.hardware import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
 from uas_coverage_env.leaderboard.row import ADDED, COLUMNS, FAILED, FORMER, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of

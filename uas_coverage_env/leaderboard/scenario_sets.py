@@ -7,7 +7,12 @@ from pathlib import Path
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import meant
 from uas_coverage_env.leaderboard.hashing import content_hash
-from uas_coverage_env.scenario import ALIASES, SERIES, Scenario, load_scenario, scenario_names
+from uas_coverage_env.scenario import (
+    Scenario,
+    installed_families,
+    load_scenario,
+    scenario_names,
+)
 from uas_coverage_env.scenario.load import is_path
 
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`
@@ -22,8 +27,8 @@ def scenarios_of(texts: Iterable[str]) -> dict[str, Scenario]:
 
     Args:
         texts: Each one or several (comma or space between them) of: the name of a set, the name of
-            a shipped scenario, the path of a scenario file, SERIES:SEED, SERIES:FIRST:END (see
-            `SERIES`).
+            a shipped scenario, the path of a scenario file, FAMILY:SEED, FAMILY:FIRST:END
+            (see `installed_families`).
 
     Raises:
         InputError: There are none, one of them cannot be read, or two that differ share a name.
@@ -81,11 +86,11 @@ def _is_file(text: str) -> bool:
 
 def _scenarios(item: str) -> Iterator[Scenario]:
     kind, _, rest = item.partition(":")
-    kind = ALIASES.get(kind, kind)
+    families = installed_families()
     if item in SETS:
-        yield from map(SERIES["generated"], SETS[item])
-    elif ":" in rest and kind in SERIES:
-        yield from map(SERIES[kind], seed_range(f"--scenarios {kind}:", rest))
+        yield from map(families["generated"].of_seed, SETS[item])
+    elif ":" in rest and kind in families:
+        yield from map(families[kind].of_seed, seed_range(f"--scenarios {kind}:", rest))
     elif not (is_path(item) or item in scenario_names()) and (close := meant(item, SETS)):
         raise InputError(f"unknown scenario or set {item!r}; did you mean {close}?")
     else:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.log import FlightLog
+from uas_coverage_env.flight.loop import recorded_versions
 from uas_coverage_env.flight.of_log import STATES, Estimate, OfLog, Pass, Unknown
-from uas_coverage_env.flight.rollout import recorded_versions
 from uas_coverage_env.operations.corners import distances_m
 from uas_coverage_env.operations.flown_battery import Battery, battery_of, unused
 from uas_coverage_env.operations.flown_way import Way, way_of

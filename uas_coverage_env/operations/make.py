@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from shapely.geometry import Point, Polygon
 
-from uas_coverage_env.draw.legend import in_words
+from uas_coverage_env.draw.signs import in_words
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.files.suggestions import check_choice
@@ -35,7 +35,7 @@ from uas_coverage_env.operations.town import Town, read_town
 from uas_coverage_env.operations.waypoints import Asked, make_waypoints
 from uas_coverage_env.operations.wishes import NOTHING
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.scenario.feasibility import back_and_forth
 
 FLOWN_BY = ("autopilot",)
 UAS_SAFE_DISTANCE_M = 5.0

@@ -4,7 +4,7 @@ import base64
 import hashlib
 import html
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,15 @@ def write_replay(
     Raises:
         InputError: A flight holds a value that is not finite, or the file cannot be written.
     """
-    page = replay_page(flights, sources=sources)
+    return write_page(replay_page(flights, sources=sources), path)
+
+
+def write_page(page: str, path: Path) -> Path:
+    """Write a page to a file, which is replaced where it exists.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
     try:
         # a name may hold what is no character (a lone surrogate): it is shown as such
         write_atomically(path, page.encode("utf-8", errors="xmlcharrefreplace"))
@@ -71,8 +79,13 @@ def replay_page(
         raise ValueError(f"{len(flights)} flights were given; a page shows one or two")
     names = sources or [flight.planner for flight in flights]
     data = [flight_data(flight, name) for flight, name in zip(flights, names, strict=True)]
+    return page_of(data, live=live)
+
+
+def page_of(data: Sequence[Mapping[str, Any]], *, live: str | None = None) -> str:
+    """`replay_page` of what `flight_data` says of each flight."""
     script, style = _part("viewer.js"), _part("viewer.css")
-    title = " and ".join(f"{flight.scenario.name}, {flight.planner}" for flight in flights)
+    title = " and ".join(f"{flight['scene']['name']}, {flight['planner']}" for flight in data)
     return _PAGE.format(
         policy=html.escape(_policy(script, style, live is not None)),
         live="" if live is None else f' data-live="{html.escape(live)}"',

@@ -7,12 +7,11 @@ from uas_coverage_env.features.wind import Gust, RandomGusts, Wind
 from uas_coverage_env.scenario.checks import free_places_m, out_of_reach, warnings
 from uas_coverage_env.scenario.conditions import Conditions, conditions_of
 from uas_coverage_env.scenario.execution import Execution
-from uas_coverage_env.scenario.families import Family, Size, installed_families
-from uas_coverage_env.scenario.family import (
-    ALIASES,
-    FAMILIES,
-    SERIES,
+from uas_coverage_env.scenario.families import Family, FamilyOfSeeds, Size, installed_families
+from uas_coverage_env.scenario.families.flood_village import flood_village
+from uas_coverage_env.scenario.families.generated import (
     GeneratedScenarios,
+    generate_scenario,
     sample_scenario,
 )
 from uas_coverage_env.scenario.fields import (
@@ -27,30 +26,26 @@ from uas_coverage_env.scenario.fields import (
     Uas,
     Waypoint,
 )
-from uas_coverage_env.scenario.flood_village import flood_village
-from uas_coverage_env.scenario.generator import generate_scenario
 from uas_coverage_env.scenario.levels import LEVELS, Level, with_disturbances
 from uas_coverage_env.scenario.load import load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
 from uas_coverage_env.scenario.packs import Sorties
+from uas_coverage_env.scenario.room import Room
 from uas_coverage_env.scenario.source import (
     MissionSource,
-    Room,
     ScenarioGenerator,
     ScenarioLike,
     loaded_scenario,
 )
 
 __all__ = [
-    "ALIASES",
-    "FAMILIES",
     "LEVELS",
-    "SERIES",
     "Conditions",
     "Decoration",
     "DisturbanceTable",
     "Execution",
     "Family",
+    "FamilyOfSeeds",
     "GeneratedScenarios",
     "Geofence",
     "Gust",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.files.suggestions import did_you_mean
-from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.scenario.feasibility import back_and_forth
 from uas_coverage_env.scenario.fields import Geofence, NoFlyZone, Obstacle
 from uas_coverage_env.scenario.unchecked import UncheckedScenario
 from uas_coverage_env.vehicle import load_vehicle, vehicle_names

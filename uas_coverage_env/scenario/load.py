@@ -4,7 +4,7 @@ from pathlib import Path
 
 from uas_coverage_env.files.strict_toml import InputError, read_json, read_toml
 from uas_coverage_env.files.suggestions import did_you_mean
-from uas_coverage_env.scenario.family import ALIASES, SERIES
+from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.scenario.model import Scenario
 
 _SHIPPED = Path(__file__).parent
@@ -24,7 +24,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 
     Args:
         name_or_path: The name of a shipped scenario, the name and the seed of a generated one as
-            in `town:7` or `streets:seed=7` (see `SERIES`, `ALIASES`), or the path of a file in
+            in `town:7` or `streets:seed=7` (see `installed_families`), or the path of a file in
             the same format, TOML or, where it ends in `.json`, the `scenario.json` of a flight; a
             string is a path where it ends in `.toml` or `.json` or contains a folder.
 
@@ -49,21 +49,20 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 
 
 def _generated(text: str) -> Scenario:
-    """SERIES:SEED."""
-    series, colon, seed = text.partition(":")
-    series, seed = ALIASES.get(series, series), seed.removeprefix("seed=")
-    if not colon or series not in SERIES:
+    """FAMILY:SEED."""
+    name, colon, seed = text.partition(":")
+    seed, families = seed.removeprefix("seed="), installed_families()
+    if not colon or name not in families:
         end = seed[:18] or "SEED"
-        known = (*scenario_names(), *(f"{name}:{end}" for name in SERIES))
+        known = (*scenario_names(), *(f"{family}:{end}" for family in families))
         otherwise = f"take {', '.join(known)} or the path of a .toml file"
-        meant = (*known, *(f"{name}:{end}" for name in ALIASES))
-        raise InputError(f"unknown scenario {text[:80]!r}; {did_you_mean(text, meant, otherwise)}")
+        raise InputError(f"unknown scenario {text[:80]!r}; {did_you_mean(text, known, otherwise)}")
     if not (seed.isdecimal() and len(seed) <= _LONGEST_SEED):
         raise InputError(
-            f"scenario {text[:80]!r}: should be {series}:SEED with one whole number of at most "
-            f"{_LONGEST_SEED} digits, as in {series}:7"
+            f"scenario {text[:80]!r}: should be {name}:SEED with one whole number of at most "
+            f"{_LONGEST_SEED} digits, as in {name}:7"
         )
-    return SERIES[series](int(seed))
+    return families[name].of_seed(int(seed))
 
 
 def is_path(name_or_path: str | Path) -> bool:

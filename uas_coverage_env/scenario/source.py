@@ -3,15 +3,16 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from uas_coverage_env.files.strict_toml import InputError, parse
-from uas_coverage_env.scenario.families import Family, installed_families
-from uas_coverage_env.scenario.family import FAMILIES, GeneratedScenarios
+from uas_coverage_env.scenario.families import Family, FamilyOfSeeds, installed_families
+from uas_coverage_env.scenario.families.generated import GeneratedScenarios
 from uas_coverage_env.scenario.load import is_path, load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario
+from uas_coverage_env.scenario.room import MOVING, SPARE, Room
 
 ScenarioGenerator = Callable[[np.random.Generator], Scenario]
 """Draws a scenario, the same one from a generator of random numbers in the same state."""
@@ -19,27 +20,6 @@ ScenarioGenerator = Callable[[np.random.Generator], Scenario]
 _EXAMPLES = 32
 # What an `EnvSpec` that was written as JSON has of a family of generated scenarios.
 _RANGES = {field.name for field in fields(GeneratedScenarios)}
-# Room for what is asked for, and for rare draws: it costs nothing, a mission refused much.
-_SPARE, _MOVING = 2, 4
-
-
-class Room(NamedTuple):
-    """The most that a mission of an environment may have; its spaces are made for that."""
-
-    n_uas: int
-    n_waypoints: int
-    n_moving: int
-
-    @classmethod
-    def of(cls, scenario: Scenario) -> "Room":
-        """What a scenario has, or may have once all of its events have happened."""
-        kinds = [event.kind for event in scenario.events]
-        n_waypoints = sum(waypoint.visits for waypoint in scenario.waypoints)
-        n_waypoints += kinds.count("waypoint_added")
-        n_moving = len(scenario.moving_obstacles) + kinds.count("moving_obstacle_added")
-        return cls(len(scenario.uas), n_waypoints, n_moving)
-
-
 _LEAST = Room(1, 1, 0)
 _NOUNS = ("UAS", "waypoints", "moving obstacles")
 
@@ -99,7 +79,7 @@ class MissionSource:
         rng = np.random.default_rng(0)
         examples = [self._drawn(rng) for _ in range(_EXAMPLES if None in said.values() else 1)]
         most = Room(*map(max, zip(*map(Room.of, examples), strict=True)))
-        spare = _SPARE * most.n_waypoints, max(_MOVING, _SPARE * most.n_moving)
+        spare = SPARE * most.n_waypoints, max(MOVING, SPARE * most.n_moving)
         found = Room(most.n_uas, *spare)
         self.room = found._replace(**{k: count for k, count in said.items() if count is not None})
         first = examples[0]
@@ -124,21 +104,16 @@ class MissionSource:
         if isinstance(missions, Mapping) and set(missions) == _RANGES:
             missions = GeneratedScenarios(**missions)
         if isinstance(missions, str):
-            missions = FAMILIES.get(missions) or installed_families().get(missions, missions)
+            missions = installed_families().get(missions, missions)
         if isinstance(missions, MissionSource):
             return missions
-        if isinstance(missions, GeneratedScenarios):
-            (_, n_uas), (_, n_waypoints) = missions.n_uas, missions.n_waypoints
-            return cls(missions, n_uas=n_uas, n_waypoints=_SPARE * n_waypoints, n_moving=_MOVING)
-        if isinstance(missions, Family):
-            (_, n_uas), (_, n_waypoints) = missions.size.n_uas, missions.size.n_waypoints
-            n_moving = max(_MOVING, missions.n_moving)
-            return cls(missions, n_uas=n_uas, n_waypoints=n_waypoints, n_moving=n_moving)
+        if isinstance(missions, Family | FamilyOfSeeds):
+            return cls(missions, **missions.room._asdict())
         if callable(missions):
             generator: Any = missions
             return cls(generator)
         if not isinstance(missions, Scenario | Mapping) and not _may_name_one(missions):
-            families = ", ".join((*FAMILIES, *installed_families()))
+            families = ", ".join(installed_families())
             raise InputError(
                 f"unknown scenario {str(missions)[:80]!r}; take {', '.join(scenario_names())}, the "
                 f"family {families}, one mission of a family as in generated:7, the path of a "
@@ -146,7 +121,7 @@ class MissionSource:
             )
         scenario = loaded_scenario(missions)
         n_uas, n_waypoints, n_moving = Room.of(scenario)
-        room = Room(n_uas, n_waypoints, max(_MOVING, n_moving))
+        room = Room(n_uas, n_waypoints, max(MOVING, n_moving))
         return cls(_Always(scenario), **room._asdict())
 
     @property

@@ -32,7 +32,8 @@ def faults(rng: np.random.Generator, scenario: Scenario) -> Scenario:
 
 
 def _families(*names: str, **size: object) -> tuple[Family, ...]:
-    return tuple(BUILT_IN[name].sized(**size) for name in names)
+    families = (BUILT_IN[name] for name in names)
+    return tuple(family.sized(**size) for family in families if isinstance(family, Family))
 
 
 LEVELS: Mapping[str, Task] = {

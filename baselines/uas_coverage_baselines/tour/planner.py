@@ -104,6 +104,7 @@ class Tour:
 
     Options = TourOptions
     comes_home_by_legs = True
+    goes_to = True
 
     def __init__(
         self,

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from uas_coverage_env.env.observation.block import ObservationBlock
-from uas_coverage_env.env.observation.grid import grid
+from uas_coverage_env.env.observation.channels import grid
 from uas_coverage_env.env.observation.layout import OBSERVATION
-from uas_coverage_env.env.observation.local import local
+from uas_coverage_env.env.observation.own_senses import local
 
 OBSERVATIONS: Mapping[str, tuple[ObservationBlock, ...]] = {
     "default": OBSERVATION,

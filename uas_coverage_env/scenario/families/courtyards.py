@@ -2,17 +2,16 @@
 
 import math
 
+from uas_coverage_env.scenario.families.family import Family
 from uas_coverage_env.scenario.families.site import (
     GAP_M,
     MARGIN_M,
     Rng,
-    Site,
     Size,
+    Square,
     Wanted,
-    grid,
     outline,
     prism,
-    strip_m,
     tag,
 )
 from uas_coverage_env.scenario.fields import Obstacle
@@ -30,8 +29,7 @@ def courtyards(rng: Rng, size: Size) -> Scenario:
     """A waypoint at the bottom of every yard, the others around and above the blocks."""
     n_uas, n_waypoints = size.draw(rng)
     lots = max(1, math.floor(math.sqrt(min(_MOST_YARDS, n_waypoints // 3))))
-    side_m = lots * _LOT_M + 2.0 * MARGIN_M
-    west_m = strip_m(n_uas, side_m)
+    square = Square.of(n_uas, lots * _LOT_M + 2.0 * MARGIN_M)
     walls: list[Obstacle] = []
     wanted: list[Wanted] = []
     for i in range(lots):
@@ -39,16 +37,16 @@ def courtyards(rng: Rng, size: Size) -> Scenario:
             yard_m, shift = rng.uniform(*_YARD_M), rng.uniform(-1.0, 1.0, size=2)
             spare_m = 0.5 * (_YARD_M[1] - yard_m) * shift
             north_m = MARGIN_M + _LOT_M * (i + 0.5) + spare_m[0]
-            east_m = west_m + MARGIN_M + _LOT_M * (j + 0.5) + spare_m[1]
+            east_m = square.west_m + MARGIN_M + _LOT_M * (j + 0.5) + spare_m[1]
             yard = f"{len(wanted) + 1}"
             walls += _block(yard, north_m, east_m, yard_m, float(rng.uniform(*_HEIGHT_M)))
             wanted.append(Wanted((north_m, east_m), _YARD_ALTITUDE_M, "yard", 2.0, _YARD_RADIUS_M))
-    site = Site(outline((0.0, side_m), (0.0, west_m + side_m)), walls)
-    inner = MARGIN_M, side_m - MARGIN_M
-    count = n_waypoints - len(wanted)
-    places = grid(rng, inner, (west_m + inner[0], west_m + inner[1]), count)
+    places = square.grid(rng, n_waypoints - len(wanted))
     wanted += [Wanted(place, _STREET_ALTITUDE_M, "street", radius_m=10.0) for place in places]
-    return site.scenario(rng, f"courtyards-{tag(rng)}", n_uas, wanted, size)
+    return square.site(walls).scenario(rng, f"courtyards-{tag(rng)}", n_uas, wanted, size)
+
+
+FAMILIES = {"courtyards": Family(courtyards)}
 
 
 def _block(

@@ -4,17 +4,17 @@ import math
 
 import numpy as np
 
+from uas_coverage_env.scenario.families.family import Family
 from uas_coverage_env.scenario.families.site import (
     MARGIN_M,
     Place_m,
     Rng,
     Site,
     Size,
+    Square,
     Wanted,
-    grid,
     outline,
     prism,
-    strip_m,
     tag,
 )
 from uas_coverage_env.scenario.fields import Obstacle
@@ -29,8 +29,8 @@ _HOUSES_PER_WAYPOINT = 0.15
 def irregular(rng: Rng, size: Size) -> Scenario:
     """Waypoints in three discs that touch or overlap; some houses."""
     n_uas, n_waypoints = size.draw(rng)
-    side_m = _PITCH_M * math.sqrt(n_waypoints) + 2.0 * MARGIN_M
-    west_m = strip_m(n_uas, side_m)
+    square = Square.at_pitch(n_uas, n_waypoints, _PITCH_M)
+    side_m, west_m = square
     # what is cut off at the corners in the north-east and the south-east
     ne_east_m, ne_north_m, se_north_m, se_east_m = rng.uniform(0.15, 0.3, size=4) * side_m
     far_m = west_m + side_m
@@ -57,8 +57,7 @@ def irregular(rng: Rng, size: Size) -> Scenario:
         )
         return near and empty.clearance_m((north_m, east_m, -_MIDDLE_M)) > MARGIN_M
 
-    inner = MARGIN_M, side_m - MARGIN_M
-    places = grid(rng, inner, (west_m + inner[0], west_m + inner[1]), n_waypoints, is_inside)
+    places = square.grid(rng, n_waypoints, is_inside)
     houses = [
         _house(rng, k, place)
         for k, place in enumerate(places[:: max(1, round(1.0 / _HOUSES_PER_WAYPOINT))])
@@ -66,6 +65,9 @@ def irregular(rng: Rng, size: Size) -> Scenario:
     site = Site(fence, houses)
     wanted = [Wanted(place) for place in places]
     return site.scenario(rng, f"irregular-{tag(rng)}", n_uas, wanted, size)
+
+
+FAMILIES = {"irregular": Family(irregular)}
 
 
 def _house(rng: Rng, k: int, place: Place_m) -> Obstacle:

@@ -1,8 +1,9 @@
-"""Low charge: streets and blocks whose batteries do not suffice for all waypoints."""
+"""Low charge: streets with batteries for 30 to 50 % of what a flight back and forth takes."""
 
-from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.scenario.families.family import Family
 from uas_coverage_env.scenario.families.site import Rng, Size
 from uas_coverage_env.scenario.families.streets import streets
+from uas_coverage_env.scenario.feasibility import back_and_forth
 from uas_coverage_env.scenario.model import Scenario
 
 _SHARE = (0.3, 0.5)
@@ -14,6 +15,9 @@ def low_charge(rng: Rng, size: Size) -> Scenario:
     scenario = streets(rng, size)
     lacking = with_charge_for(scenario, float(rng.uniform(*_SHARE)))
     return lacking.model_copy(update={"name": scenario.name.replace("streets", "low-charge")})
+
+
+FAMILIES = {"low-charge": Family(low_charge)}
 
 
 def with_charge_for(scenario: Scenario, share: float) -> Scenario:

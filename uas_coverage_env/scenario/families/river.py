@@ -4,17 +4,15 @@ import math
 
 import numpy as np
 
+from uas_coverage_env.scenario.families.family import Family
 from uas_coverage_env.scenario.families.site import (
     MARGIN_M,
     Place_m,
     Rng,
-    Site,
     Size,
+    Square,
     Wanted,
-    grid,
-    outline,
     prism,
-    strip_m,
     tag,
 )
 from uas_coverage_env.scenario.fields import Decoration
@@ -31,8 +29,8 @@ _WATER_ALTITUDE_M = 8.0
 def river(rng: Rng, size: Size) -> Scenario:
     """Waypoints low along the river and over the woods weigh twice those of the fields."""
     n_uas, n_waypoints = size.draw(rng)
-    side_m = _PITCH_M * math.sqrt(n_waypoints) + 2.0 * MARGIN_M
-    west_m = strip_m(n_uas, side_m)
+    square = Square.at_pitch(n_uas, n_waypoints, _PITCH_M)
+    side_m, west_m = square
     phase, waves = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.7, 1.4)
     middle_m, wide_m = west_m + side_m * rng.uniform(0.35, 0.65), side_m * rng.uniform(0.08, 0.2)
 
@@ -66,11 +64,8 @@ def river(rng: Rng, size: Size) -> Scenario:
     ]
     wanted += [Wanted(place, kind="forest", weight=2.0) for place, _ in woods]
     wanted = wanted[:n_waypoints]
-    inner = MARGIN_M, side_m - MARGIN_M
-    places = grid(
+    places = square.grid(
         rng,
-        inner,
-        (west_m + inner[0], west_m + inner[1]),
         max(1, n_waypoints - len(wanted)),
         lambda north, east: abs(east - course_m(north)) > 1.2 * _RIVER_M,
     )
@@ -83,5 +78,8 @@ def river(rng: Rng, size: Size) -> Scenario:
         kind="water",
         polygon_m=tuple((round(north, 1), round(east, 1)) for north, east in banks),
     )
-    site = Site(outline((0.0, side_m), (0.0, west_m + side_m)), patches, decorations=(water,))
+    site = square.site(patches, decorations=(water,))
     return site.scenario(rng, f"river-{tag(rng)}", n_uas, wanted, size)
+
+
+FAMILIES = {"river": Family(river)}

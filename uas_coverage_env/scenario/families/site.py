@@ -10,12 +10,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.scenario.endurance import back_and_forth
+from uas_coverage_env.scenario.feasibility import back_and_forth
 from uas_coverage_env.scenario.fields import (
     Decoration,
     Geofence,
@@ -31,6 +31,9 @@ Range = tuple[int, int]
 """Least and most."""
 Place_m = tuple[float, float]
 """North and east."""
+Inside = Callable[[float, float], bool]
+"""(north, east) -> whether a place is wanted."""
+Vertices_m = tuple[tuple[float, float, float], ...]
 
 CEILING_M = 50.0
 CLEARANCE_M = 3.76
@@ -40,12 +43,14 @@ GAP_M = 2.0 * CLEARANCE_M + 6.0
 MARGIN_M = 18.0
 """From the border of the area to waypoints."""
 
-_SAFE_DISTANCE_M, _UAS_SAFE_DISTANCE_M, _FENCE_MARGIN_M = 3.0, 5.0, 0.5
+DOD_MAX = 0.75
+BETWEEN_STARTS_M = 20.0
+
+_SAFE_DISTANCE_M, _FENCE_MARGIN_M = 3.0, 0.5
 _RADIUS_M = {"s500_v2": 0.36, "hexacopter": 0.40}
-_DOD_MAX, _SPARE = 0.75, 0.15
+_SPARE, _ENDLESS = 0.15, 100_000
 _CHARGES = ((0.6, 1.0), (0.8, 1.0), (1.0, 1.0))
 _MIN_HEIGHT_M = 3.0
-_BETWEEN_STARTS_M = 20.0
 _ALTITUDE_M, _ABOVE_ROOF_M = 14.0, 8.0
 _BELOW_CEILING_M = 3.0
 _DIRECTIONS, _FARTHEST_MOVE_M = 16, 30.0
@@ -91,13 +96,112 @@ class Wanted:
     radius_m: float = 15.0
 
 
-def strip_m(n_uas: int, north_m: float) -> float:
+def _anywhere(north_m: float, east_m: float) -> bool:
+    return True
+
+
+def strip_m(n_uas: int, north_m: float, beside_m: float = 16.0) -> float:
     """Width of the strip in the west that the starts of a fleet take; nothing stands there."""
-    return 16.0 + _BETWEEN_STARTS_M * math.ceil(n_uas / _start_rows(n_uas, north_m))
+    return BETWEEN_STARTS_M * math.ceil(n_uas / _start_rows(n_uas, north_m)) + beside_m
 
 
 def _start_rows(n_uas: int, north_m: float) -> int:
-    return min(n_uas, max(1, int((north_m - 2.0 * _BETWEEN_STARTS_M) // _BETWEEN_STARTS_M)))
+    return min(n_uas, max(1, int((north_m - 2.0 * BETWEEN_STARTS_M) // BETWEEN_STARTS_M)))
+
+
+def fleet(
+    vehicles: Sequence[str],
+    charges: Sequence[float],
+    north_m: float,
+    west_m: float,
+    middle_m: float | None = None,
+) -> tuple[Uas, ...]:
+    """UAS on the ground in the strip, column by column.
+
+    Args:
+        vehicles: Of each UAS.
+        charges: Likewise.
+        north_m: Extent of the area to the north.
+        west_m: East of the first column.
+        middle_m: North of the middle of each column; None: that of the area.
+    """
+    if middle_m is None:
+        middle_m = 0.5 * north_m
+    rows = _start_rows(len(vehicles), north_m)
+    made = []
+    for i, vehicle in enumerate(vehicles):
+        column, row = divmod(i, rows)
+        start_north_m = round(middle_m + BETWEEN_STARTS_M * (row - 0.5 * (rows - 1)), 1)
+        made.append(
+            Uas(
+                name=f"uas_{i + 1}",
+                vehicle=vehicle,
+                start_m=(start_north_m, west_m + BETWEEN_STARTS_M * column, -1.0),
+                soc_0=charges[i],
+                radius_m=_RADIUS_M.get(vehicle, max(_RADIUS_M.values())),
+                dod_max=DOD_MAX,
+            )
+        )
+    return tuple(made)
+
+
+def fence_around(vertices_m: Vertices_m) -> Geofence:
+    """A fence."""
+    return Geofence(margin_m=_FENCE_MARGIN_M, vertices_m=vertices_m)
+
+
+def mission(**fields: Any) -> Scenario:
+    """A scenario with what all drawn ones have in common.
+
+    Args:
+        **fields: Whatever else it has.
+    """
+    common: dict[str, Any] = {
+        "schema": 1,
+        "dt_s": 1.0,
+        "max_steps": _ENDLESS,
+        "landing_distance_m": 2.0,
+        "landing_speed_mps": 0.5,
+        "uas_safe_distance_m": 5.0,
+    }
+    return Scenario(**common | fields)
+
+
+def with_time(draft: Scenario) -> Scenario | None:
+    """The mission with steps enough, if a plan back and forth leaves 15 % of each battery."""
+    plan = back_and_forth(draft, spare=_SPARE)
+    if not plan.complete:
+        return None
+    # three times what back and forth takes, for planners that turn back early
+    steps = 100 + math.ceil(3.0 * plan.makespan_s / draft.dt_s)
+    return draft.model_copy(update={"max_steps": steps})
+
+
+class Square(NamedTuple):
+    """A square area of `side_m`, and in its west a strip of `west_m` for the starts."""
+
+    side_m: float
+    west_m: float
+
+    @classmethod
+    def of(cls, n_uas: int, side_m: float) -> "Square":
+        """That of a fleet."""
+        return cls(side_m, strip_m(n_uas, side_m))
+
+    @classmethod
+    def at_pitch(cls, n_uas: int, n_waypoints: int, pitch_m: float) -> "Square":
+        """One with room for so many waypoints at a pitch."""
+        return cls.of(n_uas, pitch_m * math.sqrt(n_waypoints) + 2.0 * MARGIN_M)
+
+    def site(self, obstacles: Sequence[Obstacle] = (), **more: Any) -> "Site":
+        """The site; arguments as for `Site`, but for the corners."""
+        corners_m = outline((0.0, self.side_m), (0.0, self.west_m + self.side_m))
+        return Site(corners_m, obstacles, **more)
+
+    def grid(self, rng: Rng, count: int, inside: Inside = _anywhere) -> list[Place_m]:
+        """`grid` over the square but for its margin."""
+        least, most = MARGIN_M, self.side_m - MARGIN_M
+        return grid(rng, (least, most), (self.west_m + least, self.west_m + most), count, inside)
 
 
 def tag(rng: Rng) -> str:
@@ -111,20 +215,24 @@ def outline(north_m: tuple[float, float], east_m: tuple[float, float]) -> list[P
 
 
 def prism(
-    name: str, kind: str, corners_m: Sequence[Place_m], height_m: float, base_m: float = 0.0
+    name: str,
+    kind: str,
+    corners_m: Sequence[Place_m],
+    height_m: float,
+    base_m: float = 0.0,
+    safe_distance_m: float = _SAFE_DISTANCE_M,
 ) -> Obstacle:
     """Something upright with a convex outline."""
     return Obstacle(
         name=name,
         kind=kind,
-        safe_distance_m=_SAFE_DISTANCE_M,
-        vertices_m=_upright(corners_m, base_m, height_m),
+        safe_distance_m=safe_distance_m,
+        vertices_m=upright(corners_m, base_m, height_m),
     )
 
 
-def _upright(
-    corners_m: Sequence[Place_m], base_m: float, height_m: float
-) -> tuple[tuple[float, float, float], ...]:
+def upright(corners_m: Sequence[Place_m], base_m: float, height_m: float) -> Vertices_m:
+    """Vertices of something upright: those at its base, then those at its top."""
     return tuple(
         (round(float(north), 1), round(float(east), 1), -round(float(z), 1))
         for z in (base_m, height_m)
@@ -137,7 +245,7 @@ def grid(
     north_m: tuple[float, float],
     east_m: tuple[float, float],
     count: int,
-    inside: Callable[[float, float], bool] = lambda north, east: True,
+    inside: Inside = _anywhere,
     jitter: float = 0.15,
 ) -> list[Place_m]:
     """So many places, about evenly spread over that part of a rectangle which is inside.
@@ -147,7 +255,7 @@ def grid(
         north_m: Of the rectangle.
         east_m: Likewise.
         count: How many.
-        inside: (north, east) -> whether a place is wanted.
+        inside: Which places are wanted.
         jitter: Largest shift, as a share of the pitch.
     """
     size_m = np.array([north_m[1] - north_m[0], east_m[1] - east_m[0]])
@@ -226,29 +334,25 @@ class Site:
         waypoints = tuple(self._placed(waypoint) for waypoint in wanted)
         vehicles = rng.choice(np.array(size.vehicles), size=n_uas).tolist()
         fullness = rng.uniform(0.0, 1.0, size=n_uas)
+        corners = np.array(self.corners_m)
+        north_m, west_m = float(np.ptp(corners[:, 0])), float(corners[:, 1].min()) + 8.0
+        middle_m = self.starts_north_m
+        if middle_m is None:
+            middle_m = float(0.5 * (corners[:, 0].min() + corners[:, 0].max()))
         for least, most in _CHARGES:
-            charges = least + (most - least) * fullness
-            draft = Scenario(
-                schema=1,
+            charges = [round(float(charge), 2) for charge in least + (most - least) * fullness]
+            draft = mission(
                 name=name,
-                dt_s=1.0,
-                max_steps=100_000,
-                landing_distance_m=2.0,
-                landing_speed_mps=0.5,
-                uas_safe_distance_m=_UAS_SAFE_DISTANCE_M,
-                min_height_m=_MIN_HEIGHT_M,
                 geofence=self._fence,
+                min_height_m=_MIN_HEIGHT_M,
                 obstacles=tuple(self.obstacles),
                 moving_obstacles=tuple(self.moving),
-                uas=tuple(self._fleet(vehicles, charges)),
+                uas=fleet(vehicles, charges, north_m, west_m, middle_m),
                 waypoints=waypoints,
                 decorations=tuple(self.decorations),
             )
-            plan = back_and_forth(draft, spare=_SPARE)
-            if plan.complete:
-                # three times what back and forth takes, for planners that turn back early
-                steps = 100 + math.ceil(3.0 * plan.makespan_s / draft.dt_s)
-                return draft.model_copy(update={"max_steps": steps})
+            if (flown := with_time(draft)) is not None:
+                return flown
         raise ValueError(
             f"{len(waypoints)} waypoints are more than the batteries of {n_uas} UAS can cover; "
             f"take more UAS or fewer waypoints"
@@ -256,32 +360,7 @@ class Site:
 
     @cached_property
     def _fence(self) -> Geofence:
-        return Geofence(
-            margin_m=_FENCE_MARGIN_M, vertices_m=_upright(self.corners_m, 0.0, CEILING_M)
-        )
-
-    def _fleet(self, vehicles: Sequence[str], charges: NDArray[np.float64]) -> list[Uas]:
-        corners = np.array(self.corners_m)
-        middle_m = self.starts_north_m
-        if middle_m is None:
-            middle_m = float(0.5 * (corners[:, 0].min() + corners[:, 0].max()))
-        rows = _start_rows(len(vehicles), float(np.ptp(corners[:, 0])))
-        west_m = float(corners[:, 1].min()) + 8.0
-        fleet = []
-        for i, vehicle in enumerate(vehicles):
-            column, row = divmod(i, rows)
-            north_m = middle_m + _BETWEEN_STARTS_M * (row - 0.5 * (rows - 1))
-            fleet.append(
-                Uas(
-                    name=f"uas_{i + 1}",
-                    vehicle=vehicle,
-                    start_m=(round(north_m, 1), west_m + _BETWEEN_STARTS_M * column, -1.0),
-                    soc_0=round(float(charges[i]), 2),
-                    radius_m=_RADIUS_M.get(vehicle, max(_RADIUS_M.values())),
-                    dod_max=_DOD_MAX,
-                )
-            )
-        return fleet
+        return fence_around(upright(self.corners_m, 0.0, CEILING_M))
 
     def _placed(self, wanted: Wanted) -> Waypoint:
         """A waypoint at the place, over the roof there, or as near beside it as can be.

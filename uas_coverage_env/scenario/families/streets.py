@@ -2,17 +2,16 @@
 
 import math
 
+from uas_coverage_env.scenario.families.family import Family
 from uas_coverage_env.scenario.families.site import (
     GAP_M,
     MARGIN_M,
     Rng,
-    Site,
     Size,
+    Square,
     Wanted,
-    grid,
     outline,
     prism,
-    strip_m,
     tag,
 )
 from uas_coverage_env.scenario.model import Scenario
@@ -28,8 +27,7 @@ def streets(rng: Rng, size: Size) -> Scenario:
     """Blocks along streets; waypoints low in the streets, and over roofs that are low enough."""
     n_uas, n_waypoints = size.draw(rng)
     lots = min(_LARGEST_SIDE, max(2, round(0.75 * math.sqrt(n_waypoints))))
-    side_m = lots * _LOT_M + 2.0 * MARGIN_M
-    west_m = strip_m(n_uas, side_m)
+    square = Square.of(n_uas, lots * _LOT_M + 2.0 * MARGIN_M)
     street_m = rng.uniform(GAP_M, GAP_M + 6.0)
     blocks = []
     for i in range(lots):
@@ -42,7 +40,7 @@ def streets(rng: Rng, size: Size) -> Scenario:
             longest_m = (0.55 if tower else 1.0) * room_m
             depth_m, width_m = longest_m * (0.8 + 0.2 * depth), longest_m * (0.8 + 0.2 * width)
             north_m = MARGIN_M + _LOT_M * (i + 0.5)
-            east_m = west_m + MARGIN_M + _LOT_M * (j + 0.5)
+            east_m = square.west_m + MARGIN_M + _LOT_M * (j + 0.5)
             low, high = _HIGH_M if tower else _LOW_M
             blocks.append(
                 prism(
@@ -55,8 +53,9 @@ def streets(rng: Rng, size: Size) -> Scenario:
                     low + (high - low) * height,
                 )
             )
-    site = Site(outline((0.0, side_m), (0.0, west_m + side_m)), blocks)
-    inner = MARGIN_M, side_m - MARGIN_M
-    places = grid(rng, inner, (west_m + inner[0], west_m + inner[1]), n_waypoints)
+    places = square.grid(rng, n_waypoints)
     wanted = [Wanted(place, _STREET_ALTITUDE_M, "street", radius_m=12.0) for place in places]
-    return site.scenario(rng, f"streets-{tag(rng)}", n_uas, wanted, size)
+    return square.site(blocks).scenario(rng, f"streets-{tag(rng)}", n_uas, wanted, size)
+
+
+FAMILIES = {"streets": Family(streets)}

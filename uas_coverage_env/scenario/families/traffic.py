@@ -1,25 +1,13 @@
-"""Moving obstacles that matter: they cross the area at the height of the waypoints."""
-
-import math
+"""Traffic: two to four moving obstacles fly to and fro at the height of the waypoints."""
 
 import numpy as np
 
-from uas_coverage_env.scenario.families.site import (
-    MARGIN_M,
-    Rng,
-    Site,
-    Size,
-    Wanted,
-    grid,
-    outline,
-    strip_m,
-    tag,
-)
+from uas_coverage_env.scenario.families.family import Family
+from uas_coverage_env.scenario.families.site import Rng, Size, Square, Wanted, tag
 from uas_coverage_env.scenario.fields import MovingObstacle, ScheduledVelocity
 from uas_coverage_env.scenario.model import Scenario
 
-MOST_MOVING = 4
-
+_MOST_MOVING = 4
 _PITCH_M = 56.0
 _RADIUS_M, _HEIGHT_M, _SAFE_DISTANCE_M = 6.0, 16.0, 4.0
 _ALTITUDE_M = 14.0
@@ -31,20 +19,20 @@ _LASTS_S = 6000.0
 def traffic(rng: Rng, size: Size) -> Scenario:
     """Two to four of them fly to and fro over rows and columns of waypoints."""
     n_uas, n_waypoints = size.draw(rng)
-    side_m = _PITCH_M * math.sqrt(n_waypoints) + 2.0 * MARGIN_M
-    west_m = strip_m(n_uas, side_m)
+    square = Square.at_pitch(n_uas, n_waypoints, _PITCH_M)
+    side_m, west_m = square
     span_north = _FROM_FENCE_M, side_m - _FROM_FENCE_M
     span_east = west_m + _FROM_STARTS_M, west_m + side_m - _FROM_FENCE_M
     moving = []
-    for k in range(int(rng.integers(2, MOST_MOVING + 1))):
+    for k in range(int(rng.integers(2, _MOST_MOVING + 1))):
         along_north = k % 2 == 0
         span, across = (span_north, span_east) if along_north else (span_east, span_north)
         moving.append(_shuttle(rng, f"helicopter_{k + 1}", along_north, span, across))
-    site = Site(outline((0.0, side_m), (0.0, west_m + side_m)), moving=moving)
-    inner = MARGIN_M, side_m - MARGIN_M
-    places = grid(rng, inner, (west_m + inner[0], west_m + inner[1]), n_waypoints)
-    wanted = [Wanted(place, _ALTITUDE_M) for place in places]
-    return site.scenario(rng, f"traffic-{tag(rng)}", n_uas, wanted, size)
+    wanted = [Wanted(place, _ALTITUDE_M) for place in square.grid(rng, n_waypoints)]
+    return square.site(moving=moving).scenario(rng, f"traffic-{tag(rng)}", n_uas, wanted, size)
+
+
+FAMILIES = {"traffic": Family(traffic, n_moving=_MOST_MOVING)}
 
 
 def _shuttle(

@@ -1,19 +1,15 @@
 """Walls with gaps: walls up to the ceiling that are passed through their gaps alone."""
 
-import math
-
+from uas_coverage_env.scenario.families.family import Family
 from uas_coverage_env.scenario.families.site import (
     CEILING_M,
     GAP_M,
-    MARGIN_M,
     Rng,
-    Site,
     Size,
+    Square,
     Wanted,
-    grid,
     outline,
     prism,
-    strip_m,
     tag,
 )
 from uas_coverage_env.scenario.fields import Obstacle
@@ -28,18 +24,18 @@ _FIELD_M = 70.0  # between two walls, at the least
 def walls(rng: Rng, size: Size) -> Scenario:
     """Fields one behind the other; each wall between two has one gap, or two."""
     n_uas, n_waypoints = size.draw(rng)
-    side_m = _PITCH_M * math.sqrt(n_waypoints) + 2.0 * MARGIN_M
-    west_m = strip_m(n_uas, side_m)
+    square = Square.at_pitch(n_uas, n_waypoints, _PITCH_M)
+    side_m = square.side_m
     n_walls = max(1, min(3, int(side_m // _FIELD_M) - 1))
     pieces: list[Obstacle] = []
     for k in range(n_walls):
-        east_m = west_m + side_m * (k + 1 + rng.uniform(-0.1, 0.1)) / (n_walls + 1)
+        east_m = square.west_m + side_m * (k + 1 + rng.uniform(-0.1, 0.1)) / (n_walls + 1)
         pieces += _wall(rng, f"wall_{k + 1}", east_m, side_m)
-    site = Site(outline((0.0, side_m), (0.0, west_m + side_m)), pieces)
-    inner = MARGIN_M, side_m - MARGIN_M
-    places = grid(rng, inner, (west_m + inner[0], west_m + inner[1]), n_waypoints)
-    wanted = [Wanted(place) for place in places]
-    return site.scenario(rng, f"walls-{tag(rng)}", n_uas, wanted, size)
+    wanted = [Wanted(place) for place in square.grid(rng, n_waypoints)]
+    return square.site(pieces).scenario(rng, f"walls-{tag(rng)}", n_uas, wanted, size)
+
+
+FAMILIES = {"walls": Family(walls)}
 
 
 def _wall(rng: Rng, name: str, east_m: float, side_m: float) -> list[Obstacle]:

@@ -14,24 +14,37 @@ Only 5 can fail for a random draw; then the next draw has fuller batteries.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.scenario.endurance import back_and_forth
-from uas_coverage_env.scenario.fields import Geofence, Obstacle, Uas, Waypoint
-from uas_coverage_env.scenario.levels import check_level, with_disturbances
+from uas_coverage_env.scenario.families.family import FamilyOfSeeds
+from uas_coverage_env.scenario.families.site import (
+    CEILING_M,
+    Range,
+    Vertices_m,
+    fence_around,
+    fleet,
+    mission,
+    outline,
+    strip_m,
+    with_time,
+)
+from uas_coverage_env.scenario.fields import Obstacle, Waypoint
+from uas_coverage_env.scenario.levels import LEVELS, check_level, with_disturbances
 from uas_coverage_env.scenario.model import Scenario
+from uas_coverage_env.scenario.room import MOVING, SPARE, Room
+
+N_UAS, N_WAYPOINTS, N_OBSTACLES = (1, 4), (20, 60), (5, 20)
+"""The ranges of the benchmarks and of the leaderboard's sets."""
+
+MIN_HEIGHT_M = 3.0
+"""The least height of the benchmarks, of the family and of the leaderboard's sets [m]."""
 
 _VEHICLE = "s500_v2"
-_UAS_RADIUS_M = 0.36
-_SAFE_DISTANCE_M = 3.0
-_CLEARANCE_M = _UAS_RADIUS_M + _SAFE_DISTANCE_M
-_UAS_SAFE_DISTANCE_M = 5.0
-_DOD_MAX = 0.75
-_CEILING_M = 50.0
+_CLEARANCE_M = 0.36 + 3.0  # radius of the vehicle, and the safe distance from what stands
 # Between a block and the next: two clearances and room to pass.
 _STREET_M = 2.0 * _CLEARANCE_M + 6.0
 _BLOCK_SIDE_M = (12.0, 40.0)
@@ -51,8 +64,7 @@ _ABOVE_ROOF_M = 10.0
 _ABOVE_LEAST_M = 1.0
 # Roofs up to this height are covered from above; higher blocks from the street beside them.
 _COVERED_ROOF_M = 22.0
-_BETWEEN_STARTS_M = 20.0
-_SPARE = 0.15
+_FIRST_START_M = 10.0
 _LOWEST_SOC = 0.6
 # The last attempts have full batteries and differ in their blocks alone.
 _ATTEMPTS = 8
@@ -61,29 +73,20 @@ _LARGEST = {"n_uas": 128, "n_waypoints": 5000, "n_obstacles": 400}
 _LARGEST_MIN_HEIGHT_M = 10.0  # there is as much room between the highest roof and the ceiling
 
 
-@dataclass(frozen=True)
-class _Town:
-    """The area: starts in a strip in the west, blocks and waypoints east of it.
-
-    Attributes:
-        north_m: Extent to the north [m].
-        west_m: Width of the strip that the starts take [m].
-        east_m: Extent of the town east of it [m].
-        rows: Rows of the grid of waypoints, south to north.
-        columns: Its columns, west to east.
-        start_rows: Starts in one column of the strip.
-    """
+class _Town(NamedTuple):
+    """The area: starts in a strip in the west, blocks and waypoints east of it."""
 
     north_m: float
     west_m: float
+    """Width of the strip."""
     east_m: float
+    """Extent of the town east of it."""
     rows: int
+    """Of the grid of waypoints, south to north."""
     columns: int
-    start_rows: int
 
 
-@dataclass(frozen=True)
-class _Block:
+class _Block(NamedTuple):
     """A box on the ground: [north_0, north_1] x [east_0, east_1] x [0, height] [m]."""
 
     north_m: tuple[float, float]
@@ -145,31 +148,99 @@ def generate_scenario(
         fullness = min(1.0, attempt / _ATTEMPTS_TO_FULL)
         lowest_soc = _LOWEST_SOC + (1.0 - _LOWEST_SOC) * fullness
         blocks = _blocks(rng, town, n_obstacles)
-        draft = Scenario(
-            schema=1,
+        charges = rng.uniform(lowest_soc, 1.0, size=n_uas).round(2).tolist()
+        draft = mission(
             name=name,
-            dt_s=1.0,
-            max_steps=100_000,
-            landing_distance_m=2.0,
-            landing_speed_mps=0.5,
-            uas_safe_distance_m=_UAS_SAFE_DISTANCE_M,
             min_height_m=float(min_height_m),
-            geofence=Geofence(margin_m=0.5, vertices_m=_fence_corners(town)),
+            geofence=fence_around(
+                _box((0.0, town.north_m), (0.0, town.west_m + town.east_m), CEILING_M)
+            ),
             obstacles=tuple(_obstacles(blocks)),
-            uas=tuple(_fleet(rng, town, n_uas, lowest_soc)),
+            uas=fleet([_VEHICLE] * n_uas, charges, town.north_m, _FIRST_START_M),
             waypoints=tuple(_waypoints(rng, town, blocks, n_waypoints, min_height_m)),
         )
-        plan = back_and_forth(draft, spare=_SPARE)
-        if plan.complete:
-            # three times what back and forth takes: room for planners that turn back early
-            steps = 100 + math.ceil(3.0 * plan.makespan_s / draft.dt_s)
-            flown = draft.model_copy(update={"max_steps": steps})
+        if (flown := with_time(draft)) is not None:
             return with_disturbances(flown, disturbances, seed)
     raise ValueError(
         f"n_waypoints is {n_waypoints}, more than the batteries of n_uas = {n_uas} can cover"
         f"{'' if size_m is None else f' in size_m = {size_m:g}'}; take more UAS, fewer waypoints"
         f"{'' if size_m is None else ' or a smaller area'}"
     )
+
+
+def sample_scenario(
+    seed: int,
+    n_uas: Range = N_UAS,
+    n_waypoints: Range = N_WAYPOINTS,
+    n_obstacles: Range = N_OBSTACLES,
+    min_height_m: float = MIN_HEIGHT_M,
+    disturbances: str | None = None,
+) -> Scenario:
+    """The town of a seed, from 0 on, which draws the counts; the rest as of `GeneratedScenarios`.
+
+    Raises:
+        ValueError: See there and `generate_scenario`.
+    """
+    ranges = n_uas, n_waypoints, n_obstacles
+    return GeneratedScenarios(*ranges, min_height_m, disturbances).of_seed(seed)
+
+
+@dataclass(frozen=True)
+class GeneratedScenarios(FamilyOfSeeds):
+    """A family of towns: an environment's `scenario=` that draws one at each reset.
+
+    Called with a generator of random numbers it draws a seed. The seeds are above those of the
+    leaderboard's sets, which nothing should be trained on.
+
+    Attributes:
+        n_uas: Least and most.
+        n_waypoints: Least and most.
+        n_obstacles: Least and most.
+        min_height_m: See `generate_scenario`.
+        disturbances: Likewise; turbulence, gusts and vehicles are drawn in every mission.
+
+    Raises:
+        ValueError: A range is not two whole numbers, the least first, or there is no such level.
+    """
+
+    n_uas: Range = N_UAS
+    n_waypoints: Range = N_WAYPOINTS
+    n_obstacles: Range = N_OBSTACLES
+    min_height_m: float = MIN_HEIGHT_M
+    disturbances: str | None = None
+
+    def __post_init__(self) -> None:
+        check_level(self.disturbances)
+        for name in _LARGEST:
+            given = getattr(self, name)
+            pair = isinstance(given, tuple | list) and len(given) == 2
+            if not pair or not all(type(count) is int for count in given) or given[0] > given[1]:
+                raise ValueError(f"{name} is {given!r}; give least and most, as in (2, 4)")
+            object.__setattr__(self, name, tuple(given))
+
+    @property
+    def room(self) -> Room:
+        """The most that a mission may have."""
+        return Room(self.n_uas[1], SPARE * self.n_waypoints[1], MOVING)
+
+    def of_seed(self, seed: int) -> Scenario:
+        """The scenario of a seed, which draws the counts too."""
+        rng = np.random.default_rng([seed, *self.n_waypoints, *self.n_obstacles])
+        counts = {
+            name: int(rng.integers(least, most + 1))
+            for name, (least, most) in ((name, getattr(self, name)) for name in _LARGEST)
+        }
+        settings = {"min_height_m": self.min_height_m, "disturbances": self.disturbances}
+        return generate_scenario(seed, **counts, **settings)
+
+
+_TOWNS = GeneratedScenarios()
+
+FAMILIES = {
+    "generated": _TOWNS,
+    "town": _TOWNS,  # as generated scenarios are named
+    **{f"generated-{level}": replace(_TOWNS, disturbances=level) for level in LEVELS},
+}
 
 
 def _check_count(name: str, value: Any, least: int, most: int) -> None:
@@ -205,13 +276,11 @@ def _town(n_uas: int, n_waypoints: int, n_obstacles: int, size_m: float | None) 
         columns = math.ceil(n_waypoints / rows)
         pitch_m = max(_PITCH_M, math.sqrt(n_obstacles / n_waypoints) * 55.0)
         north_m = rows * pitch_m + 2.0 * _WAYPOINT_INSET_M
-        start_rows = _start_rows(n_uas, north_m)
-        west_m = _strip_m(n_uas, start_rows)
+        west_m = strip_m(n_uas, north_m, _FIRST_START_M)
         east_m = columns * pitch_m + 2.0 * _WAYPOINT_INSET_M
-        return _Town(north_m, west_m, east_m, rows, columns, start_rows)
+        return _Town(north_m, west_m, east_m, rows, columns)
     north_m = float(size_m)
-    start_rows = _start_rows(n_uas, north_m)
-    west_m = _strip_m(n_uas, start_rows)
+    west_m = strip_m(n_uas, north_m, _FIRST_START_M)
     east_m = north_m - west_m
     inner_north_m, inner_east_m = (
         north_m - 2.0 * _WAYPOINT_INSET_M,
@@ -229,46 +298,11 @@ def _town(n_uas: int, n_waypoints: int, n_obstacles: int, size_m: float | None) 
             f"n_waypoints is {n_waypoints}, too many for size_m = {size_m:g}; take fewer, or a "
             f"larger area"
         )
-    return _Town(north_m, west_m, east_m, rows, columns, start_rows)
+    return _Town(north_m, west_m, east_m, rows, columns)
 
 
-def _start_rows(n_uas: int, north_m: float) -> int:
-    return min(n_uas, max(1, int((north_m - 2.0 * _BETWEEN_STARTS_M) // _BETWEEN_STARTS_M)))
-
-
-def _strip_m(n_uas: int, start_rows: int) -> float:
-    return _BETWEEN_STARTS_M * math.ceil(n_uas / start_rows) + 10.0
-
-
-def _fence_corners(town: _Town) -> tuple[tuple[float, float, float], ...]:
-    return _box_corners((0.0, town.north_m), (0.0, town.west_m + town.east_m), _CEILING_M)
-
-
-def _box_corners(
-    north_m: tuple[float, float], east_m: tuple[float, float], height_m: float
-) -> tuple[tuple[float, float, float], ...]:
-    around = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    return tuple((north_m[i], east_m[j], z) for z in (0.0, -height_m) for i, j in around)
-
-
-def _fleet(rng: np.random.Generator, town: _Town, n_uas: int, lowest_soc: float) -> list[Uas]:
-    soc_0 = rng.uniform(lowest_soc, 1.0, size=n_uas).round(2)
-    fleet = []
-    for index in range(n_uas):
-        column, row = divmod(index, town.start_rows)
-        north_m = 0.5 * town.north_m + _BETWEEN_STARTS_M * (row - 0.5 * (town.start_rows - 1))
-        start_m = (round(north_m, 1), 10.0 + _BETWEEN_STARTS_M * column, -1.0)
-        fleet.append(
-            Uas(
-                name=f"uas_{index + 1}",
-                vehicle=_VEHICLE,
-                start_m=start_m,
-                soc_0=float(soc_0[index]),
-                radius_m=_UAS_RADIUS_M,
-                dod_max=_DOD_MAX,
-            )
-        )
-    return fleet
+def _box(north_m: tuple[float, float], east_m: tuple[float, float], height_m: float) -> Vertices_m:
+    return tuple((*corner, z) for z in (0.0, -height_m) for corner in outline(north_m, east_m))
 
 
 def _blocks(rng: np.random.Generator, town: _Town, n_obstacles: int) -> list[_Block]:
@@ -311,8 +345,8 @@ def _obstacles(blocks: list[_Block]) -> list[Obstacle]:
         Obstacle(
             name=f"block_{index + 1}",
             kind="residential" if block.height_m <= _COVERED_ROOF_M else "high_rise",
-            safe_distance_m=_SAFE_DISTANCE_M,
-            vertices_m=_box_corners(block.north_m, block.east_m, block.height_m),
+            safe_distance_m=3.0,
+            vertices_m=_box(block.north_m, block.east_m, block.height_m),
         )
         for index, block in enumerate(blocks)
     ]

@@ -7,13 +7,22 @@ outlines of the forests, the course of the river, where the helicopter is parked
 lie within their cells. What is true of one map may be an accident; what is true of ten is not.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
+from uas_coverage_env.scenario.families.family import FamilyOfSeeds
+from uas_coverage_env.scenario.families.site import (
+    CEILING_M,
+    DOD_MAX,
+    fence_around,
+    mission,
+    outline,
+    prism,
+    upright,
+)
 from uas_coverage_env.scenario.fields import (
     Decoration,
-    Geofence,
     MovingObstacle,
     Obstacle,
     ScheduledVelocity,
@@ -21,14 +30,12 @@ from uas_coverage_env.scenario.fields import (
     Waypoint,
 )
 from uas_coverage_env.scenario.model import Scenario
+from uas_coverage_env.scenario.room import MOVING, Room
 
-FLOOD_VILLAGE = "flood-village"
-"""The name of these maps on the command line."""
-
-Point_m = tuple[float, float, float]
 Span_m = tuple[float, float]
 
-_SIDE_M, _CEILING_M = 500.0, 50.0
+_SIDE_M = 500.0
+_SPAN_M = (0.0, _SIDE_M)
 _UAS_RADIUS_M = 0.36
 _LOTS_NORTH_M: tuple[Span_m, ...] = ((150.0, 228.0), (272.0, 350.0))
 _LOTS_EAST_M: tuple[Span_m, ...] = ((78.0, 138.0), (146.0, 206.0), (302.0, 350.0), (358.0, 406.0))
@@ -42,14 +49,6 @@ _LIFT_OFF_S, _CLIMB_S = 200.0, 6.0
 _HELICOPTER_MPS, _HELICOPTER_MPS2 = 15.0, 3.0
 
 
-class _Block(NamedTuple):
-    """Something that stands: its name, kind, height and hull."""
-
-    kind: str
-    height_m: float
-    obstacle: Obstacle
-
-
 def flood_village(seed: int) -> Scenario:
     """The map of a seed; the same seed gives the same map.
 
@@ -58,18 +57,13 @@ def flood_village(seed: int) -> Scenario:
     """
     rng = np.random.default_rng([2025, seed])
     river_m = _river(rng)
-    blocks = [*_forests(rng), *_buildings(rng)]
+    standing = [*_forests(rng), *_buildings(rng)]
     pad_m = (float(rng.uniform(225.0, 275.0)), float(rng.uniform(446.0, 456.0)))
-    return Scenario(
-        schema=1,
-        name=f"{FLOOD_VILLAGE}-{seed}",
-        dt_s=1.0,
+    return mission(
+        name=f"flood-village-{seed}",
         max_steps=500,
-        landing_distance_m=2.0,
-        landing_speed_mps=0.5,
-        uas_safe_distance_m=5.0,
-        geofence=Geofence(margin_m=0.5, vertices_m=_prism(_corners(0, _SIDE_M, 0, _SIDE_M), 50.0)),
-        obstacles=tuple(block.obstacle for block in blocks),
+        geofence=fence_around(upright(outline(_SPAN_M, _SPAN_M), 0.0, CEILING_M)),
+        obstacles=tuple(standing),
         moving_obstacles=(_helicopter(pad_m),),
         uas=tuple(
             Uas(
@@ -78,13 +72,29 @@ def flood_village(seed: int) -> Scenario:
                 start_m=(north_m, 10.0, -1.0),
                 soc_0=soc_0,
                 radius_m=_UAS_RADIUS_M,
-                dod_max=0.75,
+                dod_max=DOD_MAX,
             )
             for i, (north_m, soc_0) in enumerate(((250.0, 1.0), (230.0, 0.433)))
         ),
-        waypoints=tuple(_waypoints(rng, blocks, river_m, pad_m)),
+        waypoints=tuple(_waypoints(rng, standing, river_m, pad_m)),
         decorations=(Decoration(name="river", kind="water", polygon_m=_banks(river_m)),),
     )
+
+
+class FloodVillages(FamilyOfSeeds):
+    """These maps."""
+
+    @property
+    def room(self) -> Room:
+        """The most that a mission may have."""
+        return Room(2, _ROWS**2, MOVING)
+
+    def of_seed(self, seed: int) -> Scenario:
+        """The map of a seed."""
+        return flood_village(seed)
+
+
+FAMILIES = {"flood-village": FloodVillages()}
 
 
 def _schedule(lift_off_s: float) -> tuple[ScheduledVelocity, ...]:
@@ -112,40 +122,29 @@ def _helicopter(pad_m: tuple[float, float]) -> MovingObstacle:
     )
 
 
-def _corners(north_0: float, north_1: float, east_0: float, east_1: float) -> list[Span_m]:
-    return [(north_0, east_0), (north_1, east_0), (north_1, east_1), (north_0, east_1)]
+def _standing(name: str, kind: str, corners_m: Sequence[Span_m], height_m: float) -> Obstacle:
+    return prism(name, kind, corners_m, height_m, safe_distance_m=_SAFE_M[kind])
 
 
-def _prism(outline_m: list[Span_m], height_m: float) -> tuple[Point_m, ...]:
-    return tuple(
-        (round(north, 1), round(east, 1), -z) for z in (0.0, height_m) for north, east in outline_m
-    )
-
-
-def _block(name: str, kind: str, height_m: float, vertices_m: tuple[Point_m, ...]) -> _Block:
-    made = Obstacle(name=name, kind=kind, safe_distance_m=_SAFE_M[kind], vertices_m=vertices_m)
-    return _Block(kind, height_m, made)
-
-
-def _forests(rng: np.random.Generator) -> list[_Block]:
+def _forests(rng: np.random.Generator) -> list[Obstacle]:
     """One in each corner of the area, a rectangle without its corners."""
     forests = []
     for south, west in ((True, True), (True, False), (False, True), (False, False)):
         north = (12.0, rng.uniform(95.0, 135.0)) if south else (rng.uniform(368.0, 408.0), 488.0)
         east = (28.0, rng.uniform(180.0, 218.0)) if west else (rng.uniform(312.0, 356.0), 488.0)
         cut = rng.uniform(12.0, 36.0, size=4)
-        outline = []
-        for k, (n, e) in enumerate(_corners(north[0], north[1], east[0], east[1])):
+        corners: list[Span_m] = []
+        for k, (n, e) in enumerate(outline(north, east)):
             inward_n = cut[k] if n == north[0] else -cut[k]
             inward_e = cut[k] if e == east[0] else -cut[k]
-            outline += [(n + inward_n, e), (n, e + inward_e)]
+            corners += [(n + inward_n, e), (n, e + inward_e)]
         name = f"forest_{'south' if south else 'north'}{'west' if west else 'east'}"
         height_m = round(float(rng.uniform(15.0, 18.0)), 1)
-        forests.append(_block(name, "forest", height_m, _prism(outline, height_m)))
+        forests.append(_standing(name, "forest", corners, height_m))
     return forests
 
 
-def _buildings(rng: np.random.Generator) -> list[_Block]:
+def _buildings(rng: np.random.Generator) -> list[Obstacle]:
     """Six of eight lots on both banks, at random."""
     lots = [(north, east) for north in _LOTS_NORTH_M for east in _LOTS_EAST_M]
     buildings = []
@@ -159,21 +158,25 @@ def _buildings(rng: np.random.Generator) -> list[_Block]:
             float(rng.uniform(span[0], span[1] - side))
             for span, side in zip(lots[lot], side_m, strict=True)
         ]
-        height_m = round(float(height_m), 1)
         n, e = low
-        vertices = _prism(_corners(n, n + side_m[0], e, e + side_m[1]), height_m)
         if kind == "church":
-            vertices = _church(n, e)
-        buildings.append(_block(f"{kind}_{k + 1}", kind, height_m, vertices))
+            made = _church(f"{kind}_{k + 1}", n, e)
+        else:
+            corners = outline((n, n + side_m[0]), (e, e + side_m[1]))
+            made = _standing(f"{kind}_{k + 1}", kind, corners, float(height_m))
+        buildings.append(made)
     return buildings
 
 
-def _church(north_m: float, east_m: float) -> tuple[Point_m, ...]:
+def _church(name: str, north_m: float, east_m: float) -> Obstacle:
     """A nave of 16 m x 32 m under a ridge, and a steeple of 30 m."""
-    nave = _prism(_corners(north_m, north_m + 16.0, east_m, east_m + 32.0), 9.0)
-    steeple = _corners(north_m + 6.0, north_m + 10.0, east_m + 3.0, east_m + 7.0)
+    nave = upright(outline((north_m, north_m + 16.0), (east_m, east_m + 32.0)), 0.0, 9.0)
+    steeple = outline((north_m + 6.0, north_m + 10.0), (east_m + 3.0, east_m + 7.0))
     top = tuple((round(n, 1), round(e, 1), -30.0) for n, e in steeple)
-    return (*nave, *top, (round(north_m + 8.0, 1), round(east_m + 32.0, 1), -14.0))
+    vertices_m = (*nave, *top, (round(north_m + 8.0, 1), round(east_m + 32.0, 1), -14.0))
+    return Obstacle(
+        name=name, kind="church", safe_distance_m=_SAFE_M["church"], vertices_m=vertices_m
+    )
 
 
 def _river(rng: np.random.Generator) -> list[Span_m]:
@@ -192,7 +195,7 @@ def _banks(river_m: list[Span_m]) -> tuple[Span_m, ...]:
 
 def _waypoints(
     rng: np.random.Generator,
-    blocks: list[_Block],
+    standing: list[Obstacle],
     river_m: list[Span_m],
     pad_m: tuple[float, float],
 ) -> list[Waypoint]:
@@ -209,21 +212,21 @@ def _waypoints(
                 north_m, east_m = behind
             middle_m = np.interp(north_m, north_of_river[:, 0], north_of_river[:, 1])
             wet = abs(east_m - middle_m) < 15.0
-            result.append(_waypoint(north_m, east_m, wet, blocks))
+            result.append(_waypoint(north_m, east_m, wet, standing))
     return result
 
 
-def _waypoint(north_m: float, east_m: float, wet: bool, blocks: list[_Block]) -> Waypoint:
+def _waypoint(north_m: float, east_m: float, wet: bool, standing: list[Obstacle]) -> Waypoint:
     """Above forests and houses, beside what is higher."""
     kind, altitude_m = ("water", _OVER_WATER_M) if wet else ("field", _ALTITUDE_M)
-    for block in blocks:
+    for obstacle in standing:
         place = np.array([north_m, east_m, -altitude_m])
-        hull = block.obstacle.hull
-        short_m = _SAFE_M[block.kind] + _UAS_RADIUS_M + _BESIDE_M - hull.signed_distance(place)
+        hull = obstacle.hull
+        short_m = obstacle.safe_distance_m + _UAS_RADIUS_M + _BESIDE_M - hull.signed_distance(place)
         if short_m <= 0.0:
             continue
-        if block.kind in ("forest", "residential"):
-            kind, altitude_m = block.kind, block.height_m + _ABOVE_ROOF_M
+        if obstacle.kind in ("forest", "residential"):
+            kind, altitude_m = obstacle.kind, _ABOVE_ROOF_M - hull.vertices_m[:, 2].min()
         else:
             walls = np.flatnonzero(np.abs(hull.normals[:, 2]) < 1e-9)
             nearest = walls[np.argmax(hull.normals[walls] @ place + hull.offsets_m[walls])]

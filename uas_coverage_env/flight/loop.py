@@ -31,7 +31,7 @@ from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
 from uas_coverage_env.vehicle import Z
-from uas_coverage_env.world import FLYING, LANDED, Command, SwarmState, Velocity, pack
+from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Velocity, pack
 from uas_coverage_env.world.packs import swaps_alone
 
 _RECORDED_PACKAGES = (
@@ -92,7 +92,7 @@ def rollout(
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
         disturbances: What pushes back; None: what the scenario says. Others than those of the
             scenario are named in the record, but no flight directory holds what they do.
-        reward: Terms of the reward that is recorded, see `RewardTerm`.
+        reward: Terms of the reward that is recorded, see `RewardTerm`; empty: none is.
         reward_weights: Mapping from reward term to weight; the other terms keep theirs.
         on_step: Called with a `Progress` once all is compiled and after every step.
         should_stop: Asked before every decision.
@@ -136,7 +136,7 @@ def rollout(
             judges_wrenches=getattr(planner, "is_learner", False),
             seed=seed,
         )
-        meter = RewardMeter(world, reward, reward_weights)
+        meter = RewardMeter(world, reward, reward_weights) if reward or reward_weights else None
         _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
@@ -195,13 +195,17 @@ def _is_uncertain(scenario: Scenario, disturbances: Sequence[Feature] | None) ->
 
 
 def _make_ready(
-    world: World, meter: RewardMeter, planner: Planner, brief: MissionBrief, seed: int
+    world: World, meter: RewardMeter | None, planner: Planner, brief: MissionBrief, seed: int
 ) -> None:
     """Compile what world and planner begin with, then put both at the start."""
     state = world.swarm_state()
-    hover = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
-    packed = pack(hover, state.names, state.active, len(state.uncovered))
-    meter.terms(packed, _stepped(world, packed))
+    stay: dict[str, Command] = dict.fromkeys(state.names, GoTo(None))
+    if not getattr(planner, "goes_to", False):
+        stay = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
+    packed = pack(stay, state.names, state.active, len(state.uncovered))
+    outcome = _stepped(world, packed)
+    if meter is not None:
+        meter.terms(packed, outcome)
     world.reset()
     warm_up = getattr(planner, "warm_up", None)
     try:
