@@ -16,7 +16,7 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.simulation.scenes import changes_scene
-from uas_coverage_env.world.arena import ARENA, Arena
+from uas_coverage_env.world.arena import ARENA, Arena, has_true_vehicles
 from uas_coverage_env.world.disturbance import fitted_to, in_slots
 from uas_coverage_env.world.events import goes_home, is_eventful
 from uas_coverage_env.world.packs import swaps_alone
@@ -65,8 +65,8 @@ class DrawnPool:
         self.sizes["S"] = source.room.n_uas if eventful else 0
         swaps = any(swaps_alone(scenario) for scenario in source.examples)
         self.sizes["B"] = source.room.n_uas if swaps else 0
-        perturbed = any(each.perturbs for own in acting for each in own)
-        self.sizes["true vehicles"] = source.room.n_uas if perturbed else 0
+        differ = any(map(has_true_vehicles, source.examples, acting))
+        self.sizes["true vehicles"] = source.room.n_uas if differ else 0
         repeats = any(scenario.asks_again for scenario in source.examples)
         self.sizes["repeats"] = self.sizes["W"] if repeats else 0
         self.changes = any(changes_scene(scenario) for scenario in source.examples)
@@ -128,11 +128,11 @@ class DrawnPool:
             scenario = scenario or self._source.draw(rng)
             own = self.settings.disturbances_in(scenario)
             fitted_to(self.disturbances, own)
-            self._check_events(scenario, any(each.perturbs for each in own))
+            self._check_events(scenario, has_true_vehicles(scenario, own))
             missions.append(DrawnMission(lane, scenario, before, rng))
         self.install(missions)
 
-    def _check_events(self, scenario: Scenario, perturbs: bool) -> None:
+    def _check_events(self, scenario: Scenario, differs: bool) -> None:
         """Refuse more events, or others, than there is room for."""
         n_events, n_sensed = len(scenario.events), len(scenario.uas) * is_eventful(scenario)
         if (
@@ -141,7 +141,7 @@ class DrawnPool:
             or goes_home(scenario) > self.goes_home
             or swaps_alone(scenario) > (self.sizes["B"] > 0)
             or scenario.asks_again > (self.sizes["repeats"] > 0)
-            or perturbs > (self.sizes["true vehicles"] > 0)
+            or differs > (self.sizes["true vehicles"] > 0)
             or changes_scene(scenario) > self.changes
         ):
             raise ValueError(

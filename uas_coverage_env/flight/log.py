@@ -137,6 +137,8 @@ class FlightLog:
             for j in np.flatnonzero(~flies[:k, i]):
                 voltage_V[j, i] = open_circuit_V(vehicle, x[j, i, DOD]) - x[j, i, U_TH]
             voltage_V[k:, i] = open_circuit_V(vehicle, x[k, i, DOD]) - x[k, i, U_TH]
+            for true in self._world.state.true_vehicles[i : i + 1]:
+                voltage_V[k:, i] -= true["further_V"][: true["n_further"]].sum()
         return {
             **{"x": x, "u": u, "voltage_V": voltage_V, "current_A": current_A, "mode": mode},
             "covered": np.array([sample.covered for sample in samples], np.int64),

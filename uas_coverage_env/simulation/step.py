@@ -21,6 +21,7 @@ from uas_coverage_env.vehicle import (
     push,
     reseed_reference,
 )
+from uas_coverage_env.vehicle.discharge import discharge_further
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.world.contacts import (
@@ -173,6 +174,8 @@ def _move(arena, state, nonlinear, disturbed, i, outcome):
         voltage_V, current_A = _move_nonlinear(flown, x, u)
     else:
         voltage_V, current_A = lpv_step(flown, x, u, x)
+    if rarely(flown.n_further > 0):
+        discharge_further(flown, flown.further_V, current_A, flown.dt_s)
     if rarely(disturbed):
         _be_pushed(vehicle, flown, state.belief[i], event, state.step[0], dod_before, x)
     event.voltage_V = voltage_V

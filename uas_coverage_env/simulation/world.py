@@ -23,6 +23,7 @@ from uas_coverage_env.simulation.scenes import (
 )
 from uas_coverage_env.simulation.step import ACCEPTED, MISSION, begin_mission, step_world
 from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
+from uas_coverage_env.vehicle.battery import BatteryState
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.world.events import begin_events, is_eventful
@@ -53,21 +54,23 @@ def initial_state(scenario: Scenario, arena: Arena | None = None) -> WorldState:
     n_uas = len(scenario.uas)
     sizes = {"U": n_uas, "W": len(scenario.waypoints), "D": 0, "true vehicles": 0}
     if arena is not None:
-        sizes |= {"D": len(arena.disturbances), "true vehicles": len(arena.perturbed)}
+        sizes |= {"D": len(arena.disturbances), "true vehicles": len(arena.true_uas)}
     sizes |= {"E": len(scenario.events), "S": n_uas if is_eventful(scenario) else 0}
     sizes |= {"B": n_uas if swaps_alone(scenario) else 0}
     sizes["repeats"] = len(scenario.waypoints) if scenario.asks_again else 0
     state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
-    state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
-    if scenario.from_ground:
-        for i, x in enumerate(state.x):
-            flown = take_off(scenario, i)
-            x[DOD], x[U_TH] = flown.dod, flown.u_th_V
+    if arena is not None:
+        state.true_vehicles[:] = arena.vehicles[arena.true_uas]
+    for i, (uas, vehicle) in enumerate(zip(scenario.uas, scenario.vehicles, strict=True)):
+        battery = BatteryState.rested(vehicle.battery, 1.0 - uas.soc_0)
+        if scenario.from_ground:
+            battery = take_off(scenario, i).battery
+        state.x[i, DOD], (state.x[i, U_TH], *further_V) = battery
+        if further_V and len(state.true_vehicles):
+            state.true_vehicles["further_V"][i, : len(further_V)] = further_V
     state.status[:] = FLYING
     state.uncovered[:] = True
-    if arena is not None:
-        state.true_vehicles[:] = arena.vehicles[arena.perturbed]
     if len(state.sensed):
         # where and how they start is known
         state.felt[:] = state.sensed[:] = state.told[:] = state.delayed[:, 0] = state.x

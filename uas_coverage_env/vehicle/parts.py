@@ -5,9 +5,15 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from uas_coverage_env.files.strict_toml import StrictModel
+
+MAX_SEGMENTS = 8
+"""Straight pieces of a discharge curve."""
+
+MAX_FURTHER_PAIRS = 3
+"""RC pairs of a battery beside the paper's."""
 
 ABSENT = math.nan
 """Stands for a value that a file leaves out and `VehicleParams` computes."""
@@ -39,7 +45,7 @@ def _computed(low: float, high: float) -> Any:
 def computed_fields(section: type[StrictModel]) -> tuple[str, ...]:
     """The fields of a section that a file may leave out, because they follow from the parts."""
     fields = section.model_fields.items()
-    return tuple(name for name, field in fields if is_absent(field.default))
+    return tuple(name for name, field in fields if field.validate_default is False)
 
 
 def is_absent(value: object) -> bool:
@@ -103,10 +109,18 @@ def _hash(record: StrictModel) -> int:
     return hash(tuple(record.__dict__[name] for name in type(record).model_fields))
 
 
+class RcPair(StrictModel):
+    """A resistance and a capacity side by side, in series with the others."""
+
+    resistance_ohm: Resistance_ohm
+    time_constant_s: Annotated[float, _within(0.01, 1e5)]
+
+
 class Battery(StrictModel):
     """Thevenin battery with a piecewise-linear discharge curve.
 
-    Nominal voltage and linearisation points are computed where they are left out.
+    Nominal voltage and linearisation points are computed where they are left out. `rc` are further
+    RC pairs, beside the paper's.
     """
 
     capacity_Ah: Annotated[float, _within(1e-3, 10_000.0)]
@@ -116,12 +130,21 @@ class Battery(StrictModel):
     polarisation_linearised_V: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
     ocv_dod: tuple[DodPoint, ...]
     ocv_V: tuple[Voltage_V, ...]
-    ocv_dod_linearised: tuple[DodPoint, ...] = ()
+    ocv_dod_linearised: Annotated[tuple[DodPoint, ...], Field(validate_default=False)] = ()
     voltage_nominal_V: Annotated[float, _computed(0.1, 10_000.0)] = ABSENT
     voltage_min_V: Voltage_V
     current_max_A: Current_A
     dod_max: Fraction
     dod_cutoff: Fraction
+    rc: Annotated[tuple[RcPair, ...], Field(max_length=MAX_FURTHER_PAIRS)] = ()
+
+    # a battery without further pairs is written as it always was
+    @model_serializer(mode="wrap")
+    def _without_empty(self, as_usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        data: dict[str, Any] = as_usual(self)
+        if not self.rc:
+            data.pop("rc", None)
+        return data
 
     # results are cached by it
     def __hash__(self) -> int:
@@ -132,8 +155,11 @@ class Battery(StrictModel):
         dod, volt = self.ocv_dod, self.ocv_V
         if len(dod) != len(volt) or len(dod) < 2:
             raise ValueError("ocv_dod and ocv_V need the same number of points, two at least")
-        if len(dod) > 9:
-            raise ValueError(f"ocv_dod has {len(dod)} points; give at most 9 (8 segments)")
+        if len(dod) > MAX_SEGMENTS + 1:
+            raise ValueError(
+                f"ocv_dod has {len(dod)} points; "
+                f"give at most {MAX_SEGMENTS + 1} ({MAX_SEGMENTS} segments)"
+            )
         if dod[0] != 0.0 or dod[-1] != 1.0:
             raise ValueError(f"ocv_dod runs from {dod[0]} to {dod[-1]}; it must run from 0 to 1")
         if any(b <= a for a, b in pairwise(dod)):
@@ -155,6 +181,21 @@ class Battery(StrictModel):
                 "lower it"
             )
         return self
+
+    @property
+    def pairs(self) -> tuple[RcPair, ...]:
+        """All RC pairs, the paper's first."""
+        return (
+            RcPair.model_construct(
+                resistance_ohm=self.resistance_th_ohm, time_constant_s=self.time_constant_th_s
+            ),
+            *self.rc,
+        )
+
+    @property
+    def resistance_ohm(self) -> float:
+        """Of a current that has flowed for a while: R_0 and those of all RC pairs."""
+        return sum((pair.resistance_ohm for pair in self.pairs), self.resistance_0_ohm)
 
     @property
     def voltages_linearised_V(self) -> tuple[float, ...]:

@@ -17,29 +17,12 @@ loss of motor speed with a falling battery voltage.
 import math
 
 from uas_coverage_env.compiled.kernels import kernel, rarely, stack_array
-from uas_coverage_env.vehicle.compiled import MAX_MOTORS, OF_PITCH, OF_ROLL, OF_THRUST, OF_YAW
-from uas_coverage_env.vehicle.layout import (
-    DELTA_THRUST,
-    DOD,
-    LIFT,
-    N_INPUTS,
-    N_STATES,
-    PHI,
-    PSI,
-    TAU_X,
-    TAU_Y,
-    TAU_Z,
-    THETA,
-    U_TH,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WY,
-    WZ,
-    X,
-)
-from uas_coverage_env.vehicle.powertrain import battery_operating_point, electrical_power_W
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.discharge import discharge, discharge_further, operating_point
+from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.parts import MAX_FURTHER_PAIRS
+from uas_coverage_env.vehicle.powertrain import electrical_power_W
+from uas_coverage_env.vehicle.record import MAX_MOTORS, OF_PITCH, OF_ROLL, OF_THRUST, OF_YAW
 from uas_coverage_env.vehicle.thrust_correction import static_thrust
 
 _SUBSTEP_S = 0.02
@@ -53,7 +36,7 @@ _RATE_ASKED_RADPS = 3.0
 _TILT_STOP_RAD = 1.3
 _RATE_STOP_RADPS = 50.0
 _UPRIGHT_MIN = 0.3
-_RIGID = DOD
+_RIGID = S.DOD
 _ROLL, _PITCH, _YAW, _ROLL_RATE, _PITCH_RATE, _YAW_RATE = range(6)
 
 
@@ -94,11 +77,11 @@ def mix(vehicle, thrust_N, torque, motor_thrust_N):
 @kernel
 def _euler_rates(x, rates):
     """Psi' = W(phi, theta) omega, into rates (3,)."""
-    sp = math.sin(x[PHI])
-    cp = math.cos(x[PHI])
-    around = (sp * x[WY] + cp * x[WZ]) / math.cos(x[THETA])
-    rates[0] = x[WX] + around * math.sin(x[THETA])
-    rates[1] = cp * x[WY] - sp * x[WZ]
+    sp = math.sin(x[S.PHI])
+    cp = math.cos(x[S.PHI])
+    around = (sp * x[S.WY] + cp * x[S.WZ]) / math.cos(x[S.THETA])
+    rates[0] = x[S.WX] + around * math.sin(x[S.THETA])
+    rates[1] = cp * x[S.WY] - sp * x[S.WZ]
     rates[2] = around
 
 
@@ -106,8 +89,8 @@ def _euler_rates(x, rates):
 def _attitude_rates(vehicle, x, rates):
     """Rates of PHI, THETA and PSI, into rates (3,)."""
     if rarely(vehicle.follows_course):
-        rates[0] = x[WX]
-        rates[1] = x[WY] / math.cos(x[PHI])
+        rates[0] = x[S.WX]
+        rates[1] = x[S.WY] / math.cos(x[S.PHI])
         rates[2] = _turn_rate(x)
     else:
         _euler_rates(x, rates)
@@ -116,46 +99,46 @@ def _attitude_rates(vehicle, x, rates):
 @kernel
 def _turn_rate(x):
     """Rate of PSI on axes that do not turn: the body rate less what tilting them takes."""
-    return x[WZ] + math.tan(x[PHI]) * x[WY]
+    return x[S.WZ] + math.tan(x[S.PHI]) * x[S.WY]
 
 
 @kernel
 def _rigid_body(vehicle, x, thrust_N, torque, dx):
     """The twelve derivatives of the rigid body with thrust and torque held."""
-    sp = math.sin(x[PHI])
-    cp = math.cos(x[PHI])
-    st = math.sin(x[THETA])
-    ct = math.cos(x[THETA])
+    sp = math.sin(x[S.PHI])
+    cp = math.cos(x[S.PHI])
+    st = math.sin(x[S.THETA])
+    ct = math.cos(x[S.THETA])
     turns = vehicle.follows_course
-    psi = 0.0 if turns else x[PSI]
+    psi = 0.0 if turns else x[S.PSI]
     ss = math.sin(psi)
     cs = math.cos(psi)
     mass = vehicle.mass_kg
     push = thrust_N / mass
     drag = vehicle.drag_kgps / mass
     for axis in range(3):
-        dx[X + axis] = x[VX + axis]
-    dx[VX] = -push * (cp * st * cs + sp * ss) - drag * x[VX]
-    dx[VY] = -push * (cp * st * ss - sp * cs) - drag * x[VY]
-    dx[VZ] = vehicle.gravity_mps2 - push * cp * ct
-    dx[VZ] -= vehicle.drag_vertical_kgps / mass * x[VZ]
-    _attitude_rates(vehicle, x, dx[PHI:WX])
-    p = x[WX]
-    q = x[WY]
+        dx[S.X + axis] = x[S.VX + axis]
+    dx[S.VX] = -push * (cp * st * cs + sp * ss) - drag * x[S.VX]
+    dx[S.VY] = -push * (cp * st * ss - sp * cs) - drag * x[S.VY]
+    dx[S.VZ] = vehicle.gravity_mps2 - push * cp * ct
+    dx[S.VZ] -= vehicle.drag_vertical_kgps / mass * x[S.VZ]
+    _attitude_rates(vehicle, x, dx[S.PHI : S.WX])
+    p = x[S.WX]
+    q = x[S.WY]
     if rarely(turns):
-        ss = math.sin(x[PSI])
-        cs = math.cos(x[PSI])
-        p = cs * x[WX] + ss * x[WY]
-        q = cs * x[WY] - ss * x[WX]
+        ss = math.sin(x[S.PSI])
+        cs = math.cos(x[S.PSI])
+        p = cs * x[S.WX] + ss * x[S.WY]
+        q = cs * x[S.WY] - ss * x[S.WX]
     inertia = vehicle.inertia_kgm2
-    dp = (torque[0] - (inertia[2] - inertia[1]) * q * x[WZ]) / inertia[0]
-    dq = (torque[1] - (inertia[0] - inertia[2]) * x[WZ] * p) / inertia[1]
-    dx[WX] = dp
-    dx[WY] = dq
-    dx[WZ] = (torque[2] - (inertia[1] - inertia[0]) * p * q) / inertia[2]
+    dp = (torque[0] - (inertia[2] - inertia[1]) * q * x[S.WZ]) / inertia[0]
+    dq = (torque[1] - (inertia[0] - inertia[2]) * x[S.WZ] * p) / inertia[1]
+    dx[S.WX] = dp
+    dx[S.WY] = dq
+    dx[S.WZ] = (torque[2] - (inertia[1] - inertia[0]) * p * q) / inertia[2]
     if rarely(turns):
-        dx[WX] = cs * dp - ss * dq - dx[PSI] * x[WY]
-        dx[WY] = ss * dp + cs * dq + dx[PSI] * x[WX]
+        dx[S.WX] = cs * dp - ss * dq - dx[S.PSI] * x[S.WY]
+        dx[S.WY] = ss * dp + cs * dq + dx[S.PSI] * x[S.WX]
 
 
 @kernel
@@ -188,9 +171,9 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
         torque: (3,) [N m] written.
     """
     inertia = vehicle.inertia_kgm2
-    alpha_roll = u[TAU_X] / inertia[0]
-    alpha_pitch = u[TAU_Y] / inertia[1]
-    alpha_yaw = u[TAU_Z] / inertia[2]
+    alpha_roll = u[S.TAU_X] / inertia[0]
+    alpha_pitch = u[S.TAU_Y] / inertia[1]
+    alpha_yaw = u[S.TAU_Z] / inertia[2]
     half = 0.5 * time_s
     rate = first[_PITCH_RATE] + alpha_pitch * time_s
     _asked(first[_PITCH] + (first[_PITCH_RATE] + rate) * half, rate, alpha_pitch, pitch)
@@ -203,23 +186,23 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     yaw_rate = first[_YAW_RATE] + alpha_yaw * time_s
     yaw = first[_YAW] + (first[_YAW_RATE] + yaw_rate) * half
     # Euler rates wanted, then body rates by the inverse of W
-    phi_rate = roll[1] + _ANGLE_GAIN_PER_S * (roll[0] - x[PHI])
-    theta_rate = pitch[1] + _ANGLE_GAIN_PER_S * (pitch[0] - x[THETA])
-    psi_rate = yaw_rate + _ANGLE_GAIN_PER_S * (yaw - x[PSI])
+    phi_rate = roll[1] + _ANGLE_GAIN_PER_S * (roll[0] - x[S.PHI])
+    theta_rate = pitch[1] + _ANGLE_GAIN_PER_S * (pitch[0] - x[S.THETA])
+    psi_rate = yaw_rate + _ANGLE_GAIN_PER_S * (yaw - x[S.PSI])
     psi_rate = min(max(psi_rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
-    sp = math.sin(x[PHI])
-    cp = math.cos(x[PHI])
-    st = math.sin(x[THETA])
-    ct = math.cos(x[THETA])
+    sp = math.sin(x[S.PHI])
+    cp = math.cos(x[S.PHI])
+    st = math.sin(x[S.THETA])
+    ct = math.cos(x[S.THETA])
     p = phi_rate - st * psi_rate
     q = cp * theta_rate + sp * ct * psi_rate
     r = cp * ct * psi_rate - sp * theta_rate
     ahead_p = roll[2] - st * alpha_yaw
     ahead_q = cp * pitch[2] + sp * ct * alpha_yaw
     ahead_r = cp * ct * alpha_yaw - sp * pitch[2]
-    torque[0] = inertia[0] * (ahead_p + _RATE_GAIN_PER_S * (p - x[WX]))
-    torque[1] = inertia[1] * (ahead_q + _RATE_GAIN_PER_S * (q - x[WY]))
-    torque[2] = inertia[2] * (ahead_r + _RATE_GAIN_PER_S * (r - x[WZ]))
+    torque[0] = inertia[0] * (ahead_p + _RATE_GAIN_PER_S * (p - x[S.WX]))
+    torque[1] = inertia[1] * (ahead_q + _RATE_GAIN_PER_S * (q - x[S.WY]))
+    torque[2] = inertia[2] * (ahead_r + _RATE_GAIN_PER_S * (r - x[S.WZ]))
 
 
 @kernel
@@ -231,28 +214,28 @@ def _turning_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     level = stack_array(N_STATES)
     facing = stack_array(6)
     tilting = stack_array(N_INPUTS)
-    for s in range(PHI, DOD):
+    for s in range(S.PHI, S.DOD):
         level[s] = x[s]
-        facing[s - PHI] = first[s - PHI]
-    for k in range(N_INPUTS):
+        facing[s - S.PHI] = first[s - S.PHI]
+    for k in range(S.N_INPUTS):
         tilting[k] = u[k]
-    level[PSI] = 0.0
+    level[S.PSI] = 0.0
     facing[_YAW] = 0.0
     facing[_YAW_RATE] = 0.0
-    tilting[TAU_Z] = 0.0
+    tilting[S.TAU_Z] = 0.0
     _attitude_loop(vehicle, level, facing, tilting, time_s, roll, pitch, torque)
     inertia = vehicle.inertia_kgm2
-    alpha = u[TAU_Z] / inertia[2]
+    alpha = u[S.TAU_Z] / inertia[2]
     turn_rate = _turn_rate(x)
     rate = first[_YAW_RATE] + alpha * time_s
     heading = first[_YAW] + 0.5 * (first[_YAW_RATE] + rate) * time_s
-    rate += _ANGLE_GAIN_PER_S * (heading - x[PSI])
+    rate += _ANGLE_GAIN_PER_S * (heading - x[S.PSI])
     rate = min(max(rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
     torque[2] = inertia[2] * (alpha + _RATE_GAIN_PER_S * (rate - turn_rate))
-    cs = math.cos(x[PSI])
-    ss = math.sin(x[PSI])
-    p = cs * x[WX] + ss * x[WY]
-    q = cs * x[WY] - ss * x[WX]
+    cs = math.cos(x[S.PSI])
+    ss = math.sin(x[S.PSI])
+    p = cs * x[S.WX] + ss * x[S.WY]
+    q = cs * x[S.WY] - ss * x[S.WX]
     about_x = torque[0] / inertia[0]
     about_y = torque[1] / inertia[1]
     torque[0] = inertia[0] * (cs * about_x + ss * about_y + turn_rate * q)
@@ -275,9 +258,9 @@ def _integrate(vehicle, x, h, thrust_N, torque, k, total, middle):
     for s in range(_RIGID):
         x[s] += h / 6.0 * total[s]
     for axis in range(3):
-        x[WX + axis] = min(max(x[WX + axis], -_RATE_STOP_RADPS), _RATE_STOP_RADPS)
+        x[S.WX + axis] = min(max(x[S.WX + axis], -_RATE_STOP_RADPS), _RATE_STOP_RADPS)
     for axis in range(2):
-        x[PHI + axis] = min(max(x[PHI + axis], -_TILT_STOP_RAD), _TILT_STOP_RAD)
+        x[S.PHI + axis] = min(max(x[S.PHI + axis], -_TILT_STOP_RAD), _TILT_STOP_RAD)
 
 
 @kernel
@@ -305,10 +288,13 @@ def plant_step(vehicle, x, u, x_next):
     total = stack_array(_RIGID)
     middle = stack_array(_RIGID)
     motors = stack_array(MAX_MOTORS)
+    further_V = stack_array(MAX_FURTHER_PAIRS)
+    for p in range(vehicle.n_further):
+        further_V[p] = vehicle.further_V[p]
     for s in range(x.shape[0]):
         x_next[s] = x[s]
     for s in range(6):
-        first[s] = x_next[PHI + s]
+        first[s] = x_next[S.PHI + s]
     # the LPV model reads body rates as rates of the angles; of a body that spins, the part of the
     # spin in them changes no tilt and would be taken for more and more of it
     turns = vehicle.follows_course
@@ -316,9 +302,9 @@ def plant_step(vehicle, x, u, x_next):
     if rarely(turns):
         roll[2] = 0.0
         # the body's own rate, until the end of the step
-        x_next[WZ] -= math.tan(x_next[PHI]) * x_next[WY]
-    first[_ROLL_RATE] += math.sin(x_next[THETA]) * roll[2]
-    first[_PITCH_RATE] -= math.sin(x_next[PHI]) * math.cos(x_next[THETA]) * roll[2]
+        x_next[S.WZ] -= math.tan(x_next[S.PHI]) * x_next[S.WY]
+    first[_ROLL_RATE] += math.sin(x_next[S.THETA]) * roll[2]
+    first[_PITCH_RATE] -= math.sin(x_next[S.PHI]) * math.cos(x_next[S.THETA]) * roll[2]
     correction = 0.0
     charge = 0.0
     energy = 0.0
@@ -329,24 +315,25 @@ def plant_step(vehicle, x, u, x_next):
             _attitude_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
         # upright in the middle of the substep
         _attitude_rates(vehicle, x_next, roll)
-        upright = math.cos(x_next[PHI] + 0.5 * h * roll[0])
-        upright *= math.cos(x_next[THETA] + 0.5 * h * roll[1])
-        thrust = (vehicle.weight_N + u[LIFT]) / max(upright, _UPRIGHT_MIN)
+        upright = math.cos(x_next[S.PHI] + 0.5 * h * roll[0])
+        upright *= math.cos(x_next[S.THETA] + 0.5 * h * roll[1])
+        thrust = (vehicle.weight_N + u[S.LIFT]) / max(upright, _UPRIGHT_MIN)
         thrust = mix(vehicle, thrust, torque, motors)
         static = static_thrust(
             vehicle,
             thrust,
-            x_next[PHI],
-            x_next[THETA],
-            0.0 if turns else x_next[PSI],
-            x_next[VX],
-            x_next[VY],
-            x_next[VZ],
+            x_next[S.PHI],
+            x_next[S.THETA],
+            0.0 if turns else x_next[S.PSI],
+            x_next[S.VX],
+            x_next[S.VY],
+            x_next[S.VZ],
         )
         power = vehicle.power_factor * electrical_power_W(vehicle, static)
-        voltage, current = battery_operating_point(vehicle, x_next[DOD], x_next[U_TH], power)
-        x_next[DOD] += current * h / vehicle.capacity_As
-        x_next[U_TH] = left * x_next[U_TH] + (1.0 - left) * vehicle.resistance_th_ohm * current
+        voltage, current = operating_point(vehicle, further_V, x_next, power)
+        discharge(vehicle, x_next, current, h, left)
+        if rarely(vehicle.n_further > 0):
+            discharge_further(vehicle, further_V, current, h)
         correction += static - vehicle.weight_N
         charge += current * h
         energy += voltage * current * h
@@ -355,6 +342,6 @@ def plant_step(vehicle, x, u, x_next):
         thrust *= vehicle.thrust_factor
         _integrate(vehicle, x_next, h, thrust, torque, slope, total, middle)
     if rarely(turns):
-        x_next[WZ] = _turn_rate(x_next)
-    u[DELTA_THRUST] = correction / steps
+        x_next[S.WZ] = _turn_rate(x_next)
+    u[S.DELTA_THRUST] = correction / steps
     return energy / charge, charge / vehicle.dt_s

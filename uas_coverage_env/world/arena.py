@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.memory import Memory, record_dtype
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
-from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
+from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
 from uas_coverage_env.vehicle.stopping import stopping_of
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
 from uas_coverage_env.world.commands import CLIMB, COMMAND_DTYPE
@@ -156,8 +156,8 @@ class Arena(NamedTuple):
     """As many as `WorldState` has room for; that is the same in all missions of a pool."""
     disturbance_parameters: Annotated[NDArray[np.float64], "parameters"]
     """Of all disturbances."""
-    perturbed: Annotated[NDArray[np.int64], "true vehicles"]
-    """The UAS whose vehicles disturbances may make others than is believed: all, or none."""
+    true_uas: Annotated[NDArray[np.int64], "true vehicles"]
+    """The UAS with a record in `WorldState.true_vehicles`: all, or none."""
     events: Annotated[NDArray[np.void], EVENT_DTYPE, "E"]
     sensing: Annotated[NDArray[np.void], SENSING_DTYPE, "S"]
     """One for each UAS, or none where they are known as they are."""
@@ -238,7 +238,7 @@ def build_arena(
         node_distance_m=corners.distance_m,
         disturbances=blocks,
         disturbance_parameters=parameters,
-        perturbed=np.arange(len(uas) if any(d and d.perturbs for d in disturbances) else 0),
+        true_uas=np.arange(len(uas) if has_true_vehicles(scenario, disturbances) else 0),
         events=event_records(scenario),
         sensing=sensing_records(scenario),
         packs=pack_records(scenario),
@@ -254,6 +254,12 @@ def _vehicles(scenario: Scenario) -> NDArray[np.void]:
         records[i] = compiled[vehicle]
     records["follows_course"] = [uas.heading == "course" for uas in scenario.uas]
     return records
+
+
+def has_true_vehicles(scenario: Scenario, disturbances: Sequence[Disturbance | None]) -> bool:
+    """Whether vehicles may differ from their files, or batteries have a memory beside x."""
+    perturbed = any(each is not None and each.perturbs for each in disturbances)
+    return perturbed or any(vehicle.battery.rc for vehicle in scenario.vehicles)
 
 
 def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -5,20 +5,20 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.geometry import cylinder_faces
-from uas_coverage_env.vehicle.battery import battery_segments, check_step, polarisation_decay
+from uas_coverage_env.vehicle import battery
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import (
     N_ROW_COLUMNS,
     ORDER,
     design_velocity_loop,
     horizontal_axis,
 )
-from uas_coverage_env.vehicle.layout import LIFT, VX, VZ, X, Z
 from uas_coverage_env.vehicle.limits import N_LIMITS, bounds_of
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
+from uas_coverage_env.vehicle.parts import MAX_FURTHER_PAIRS, MAX_SEGMENTS
 from uas_coverage_env.vehicle.true_vehicle import N_PERTURBATIONS
 
-MAX_SEGMENTS = 8
 MAX_GOVERNOR_ROWS = 128
 GOVERNOR_BLOCK = 8
 """So many governor rows are looked at together."""
@@ -35,6 +35,7 @@ COUNTS = {
     "n_segments": (0, MAX_SEGMENTS),
     "n_governor_rows": (0, MAX_GOVERNOR_ROWS),
     "n_motors": (0, MAX_MOTORS),
+    "n_further": (0, MAX_FURTHER_PAIRS),
 }
 """How many rows of a record are in use, and how few and many these may be."""
 
@@ -63,20 +64,7 @@ VEHICLE_DTYPE = record_dtype(
         ("power_factor", _f8),
         ("lift_surplus_N", _f8),
         ("perturbation", _f8, (N_PERTURBATIONS,)),
-        # battery: a row per segment of the discharge curve
-        ("n_segments", _i8),
-        ("dod_end", _f8, (MAX_SEGMENTS,)),
-        ("ocv_V", _f8, (MAX_SEGMENTS,)),
-        ("ocv_slope_V", _f8, (MAX_SEGMENTS,)),
-        ("current_A", _f8, (MAX_SEGMENTS,)),
-        ("current_A_per_V", _f8, (MAX_SEGMENTS,)),
-        ("current_A_per_N", _f8, (MAX_SEGMENTS,)),
-        ("drop_V", _f8, (MAX_SEGMENTS,)),
-        ("capacity_As", _f8),
-        ("resistance_0_ohm", _f8),
-        ("resistance_th_ohm", _f8),
-        ("time_constant_th_s", _f8),
-        ("polarisation_decay", _f8),
+        *battery.RECORD_FIELDS,
         # thrust correction
         ("faces", _f8, (PHYSICAL_SIDES, 2)),
         ("speed_N_per_mps", _f8),
@@ -133,7 +121,6 @@ VEHICLE_DTYPE = record_dtype(
         ("esc_loss_W", _f8),
         ("esc_efficiency", _f8),
         ("auxiliary_W", _f8),
-        ("hover_W", _f8),
     ]
 )
 """A vehicle at one sampling time."""
@@ -152,30 +139,22 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     Raises:
         ValueError: dt_s out of range, or limits that no inner loop can keep.
     """
-    check_step(dt_s)
+    battery.check_step(dt_s)
     if dt_s < _DT_MIN_S:
         raise ValueError(f"dt_s is {dt_s}; the vehicle's inner loop needs {_DT_MIN_S} s at least")
     record = np.zeros(1, VEHICLE_DTYPE)
-    battery, limits = vehicle.battery, vehicle.limits
+    limits = vehicle.limits
     A, B = taylor(*rigid_body(vehicle), dt_s, ORDER)
     record["dt_s"] = dt_s
     record["axis_A"], record["axis_B"] = horizontal_axis(vehicle, dt_s)
-    record["vertical_A"] = A[np.ix_([Z, VZ], [Z, VZ])]
-    record["vertical_B"] = B[[Z, VZ], LIFT]
+    record["vertical_A"] = A[np.ix_([S.Z, S.VZ], [S.Z, S.VZ])]
+    record["vertical_B"] = B[[S.Z, S.VZ], S.LIFT]
     record["horizontal_force_B"] = horizontal_force(vehicle, dt_s)
     record["yaw_B"] = 0.5 * dt_s * dt_s, dt_s
     for name, value in vehicle.kernel_scalars().items():
         record[name] = value
     record["inertia_kgm2"] = vehicle.airframe.inertia_kgm2
-    segments = battery_segments(vehicle)
-    record["n_segments"] = len(segments)
-    for row, segment in enumerate(segments):
-        for name, value in segment._asdict().items():
-            record[name][0, row] = value
-    record["capacity_As"] = 3600.0 * battery.capacity_Ah
-    for name in ("resistance_0_ohm", "resistance_th_ohm", "time_constant_th_s"):
-        record[name] = getattr(battery, name)
-    record["polarisation_decay"] = polarisation_decay(vehicle, dt_s)
+    battery.write_battery(record, vehicle, dt_s)
     record["faces"] = cylinder_faces(PHYSICAL_SIDES)[:, :2]
     for name, value in vehicle.thrust_correction:
         record[name] = value
@@ -207,7 +186,6 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     torques = _rotor_map(vehicle)
     record["rotor_map"][0, : len(torques)] = torques
     record["mixer"][0, : len(torques)] = _mixer(torques)
-    record["hover_W"] = vehicle.power.hover_W
     return record.reshape(())
 
 
@@ -215,8 +193,8 @@ def horizontal_force(vehicle: VehicleParams, dt_s: float) -> NDArray[np.float64]
     """(2,) what a horizontal force of 1 N, held over a step, adds to position and velocity."""
     A, B = rigid_body(vehicle)
     B = np.zeros_like(B[:, :1])
-    B[VX] = 1.0 / vehicle.airframe.mass_kg
-    return taylor(A, B, dt_s, ORDER)[1][[X, VX], 0]
+    B[S.VX] = 1.0 / vehicle.airframe.mass_kg
+    return taylor(A, B, dt_s, ORDER)[1][[S.X, S.VX], 0]
 
 
 def _rotor_map(vehicle: VehicleParams) -> NDArray[np.float64]:
