@@ -84,7 +84,13 @@ def fly_kinematics(vehicle, x, u):
     lift = vehicle.thrust_factor * u[S.LIFT] + vehicle.lift_surplus_N
     x[S.Z] = A[S.POSITION, S.POSITION] * z + A[S.POSITION, S.SPEED] * vz + B[S.POSITION] * lift
     x[S.VZ] = A[S.SPEED, S.SPEED] * vz + B[S.SPEED] * lift
-    alpha = u[S.TAU_Z] / inertia[2]
+    turn(vehicle, x, u)
+
+
+@inlined_kernel
+def turn(vehicle, x, u):
+    """Heading and yaw rate one step on, in place; no other state depends on them."""
+    alpha = u[S.TAU_Z] / vehicle.inertia_kgm2[2]
     x[S.PSI] += vehicle.dt_s * x[S.WZ] + vehicle.yaw_B[S.POSITION] * alpha
     x[S.WZ] += vehicle.yaw_B[S.SPEED] * alpha
 

@@ -6,12 +6,11 @@ state, theta_lin(t). There, tilt is horizontal acceleration over g, which is the
 real one under a thrust whose vertical part is weight plus lift: the loop follows
 theta = atan(theta_lin(t)), and the velocities of the step come out as predicted.
 
-A UAS that looks where it flies has its tilts and their rates on axes that do not turn (`layout`):
-body to NED is pitch, then roll, then the turn about the body's own axis. Thrust, drag and power do
-not depend on the turn; torques, inertia and motors are those of the body.
+A UAS that looks where it flies has its tilts on axes that do not turn (`layout`). It is flown as
+if it faced north: its heading goes beside, as the LPV model has it, and nothing depends on it.
 
-Left out: motor lag (30 ms against steps of a second), the gyroscopic torque of the rotors, and the
-loss of motor speed with a falling battery voltage.
+Left out: motor lag (30 ms against steps of a second), the gyroscopic torque of the rotors, the
+loss of motor speed with a falling battery voltage, what a turn to the course does to the tilts.
 """
 
 import math
@@ -19,7 +18,7 @@ import math
 from uas_coverage_env.compiled.kernels import kernel, rarely, stack_array
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.discharge import discharge, discharge_further, operating_point
-from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.lpv import turn
 from uas_coverage_env.vehicle.parts import MAX_FURTHER_PAIRS
 from uas_coverage_env.vehicle.powertrain import electrical_power_W
 from uas_coverage_env.vehicle.record import MAX_MOTORS, OF_PITCH, OF_ROLL, OF_THRUST, OF_YAW
@@ -86,33 +85,14 @@ def _euler_rates(x, rates):
 
 
 @kernel
-def _attitude_rates(vehicle, x, rates):
-    """Rates of PHI, THETA and PSI, into rates (3,)."""
-    if rarely(vehicle.follows_course):
-        rates[0] = x[S.WX]
-        rates[1] = x[S.WY] / math.cos(x[S.PHI])
-        rates[2] = _turn_rate(x)
-    else:
-        _euler_rates(x, rates)
-
-
-@kernel
-def _turn_rate(x):
-    """Rate of PSI on axes that do not turn: the body rate less what tilting them takes."""
-    return x[S.WZ] + math.tan(x[S.PHI]) * x[S.WY]
-
-
-@kernel
 def _rigid_body(vehicle, x, thrust_N, torque, dx):
     """The twelve derivatives of the rigid body with thrust and torque held."""
     sp = math.sin(x[S.PHI])
     cp = math.cos(x[S.PHI])
     st = math.sin(x[S.THETA])
     ct = math.cos(x[S.THETA])
-    turns = vehicle.follows_course
-    psi = 0.0 if turns else x[S.PSI]
-    ss = math.sin(psi)
-    cs = math.cos(psi)
+    ss = math.sin(x[S.PSI])
+    cs = math.cos(x[S.PSI])
     mass = vehicle.mass_kg
     push = thrust_N / mass
     drag = vehicle.drag_kgps / mass
@@ -122,23 +102,13 @@ def _rigid_body(vehicle, x, thrust_N, torque, dx):
     dx[S.VY] = -push * (cp * st * ss - sp * cs) - drag * x[S.VY]
     dx[S.VZ] = vehicle.gravity_mps2 - push * cp * ct
     dx[S.VZ] -= vehicle.drag_vertical_kgps / mass * x[S.VZ]
-    _attitude_rates(vehicle, x, dx[S.PHI : S.WX])
+    _euler_rates(x, dx[S.PHI : S.WX])
     p = x[S.WX]
     q = x[S.WY]
-    if rarely(turns):
-        ss = math.sin(x[S.PSI])
-        cs = math.cos(x[S.PSI])
-        p = cs * x[S.WX] + ss * x[S.WY]
-        q = cs * x[S.WY] - ss * x[S.WX]
     inertia = vehicle.inertia_kgm2
-    dp = (torque[0] - (inertia[2] - inertia[1]) * q * x[S.WZ]) / inertia[0]
-    dq = (torque[1] - (inertia[0] - inertia[2]) * x[S.WZ] * p) / inertia[1]
-    dx[S.WX] = dp
-    dx[S.WY] = dq
+    dx[S.WX] = (torque[0] - (inertia[2] - inertia[1]) * q * x[S.WZ]) / inertia[0]
+    dx[S.WY] = (torque[1] - (inertia[0] - inertia[2]) * x[S.WZ] * p) / inertia[1]
     dx[S.WZ] = (torque[2] - (inertia[1] - inertia[0]) * p * q) / inertia[2]
-    if rarely(turns):
-        dx[S.WX] = cs * dp - ss * dq - dx[S.PSI] * x[S.WY]
-        dx[S.WY] = ss * dp + cs * dq + dx[S.PSI] * x[S.WX]
 
 
 @kernel
@@ -206,43 +176,6 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
 
 
 @kernel
-def _turning_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
-    """`_attitude_loop` of a UAS that turns: tilts as if it did not, and its heading beside them.
-
-    Arguments as there; the torque is that of the body.
-    """
-    level = stack_array(N_STATES)
-    facing = stack_array(6)
-    tilting = stack_array(N_INPUTS)
-    for s in range(S.PHI, S.DOD):
-        level[s] = x[s]
-        facing[s - S.PHI] = first[s - S.PHI]
-    for k in range(S.N_INPUTS):
-        tilting[k] = u[k]
-    level[S.PSI] = 0.0
-    facing[_YAW] = 0.0
-    facing[_YAW_RATE] = 0.0
-    tilting[S.TAU_Z] = 0.0
-    _attitude_loop(vehicle, level, facing, tilting, time_s, roll, pitch, torque)
-    inertia = vehicle.inertia_kgm2
-    alpha = u[S.TAU_Z] / inertia[2]
-    turn_rate = _turn_rate(x)
-    rate = first[_YAW_RATE] + alpha * time_s
-    heading = first[_YAW] + 0.5 * (first[_YAW_RATE] + rate) * time_s
-    rate += _ANGLE_GAIN_PER_S * (heading - x[S.PSI])
-    rate = min(max(rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
-    torque[2] = inertia[2] * (alpha + _RATE_GAIN_PER_S * (rate - turn_rate))
-    cs = math.cos(x[S.PSI])
-    ss = math.sin(x[S.PSI])
-    p = cs * x[S.WX] + ss * x[S.WY]
-    q = cs * x[S.WY] - ss * x[S.WX]
-    about_x = torque[0] / inertia[0]
-    about_y = torque[1] / inertia[1]
-    torque[0] = inertia[0] * (cs * about_x + ss * about_y + turn_rate * q)
-    torque[1] = inertia[1] * (cs * about_y - ss * about_x - turn_rate * p)
-
-
-@kernel
 def _integrate(vehicle, x, h, thrust_N, torque, k, total, middle):
     """One Runge-Kutta step of the rigid body in place; k, total, middle (12,) are room."""
     for s in range(_RIGID):
@@ -293,28 +226,25 @@ def plant_step(vehicle, x, u, x_next):
         further_V[p] = vehicle.further_V[p]
     for s in range(x.shape[0]):
         x_next[s] = x[s]
+    psi, yaw_rate, yaw_torque = x[S.PSI], x[S.WZ], u[S.TAU_Z]
+    if rarely(vehicle.follows_course):
+        x_next[S.PSI] = u[S.TAU_Z] = 0.0
+        # the body's own rate, at which its tilts do not turn it
+        x_next[S.WZ] = -math.tan(x_next[S.PHI]) * x_next[S.WY]
     for s in range(6):
         first[s] = x_next[S.PHI + s]
     # the LPV model reads body rates as rates of the angles; of a body that spins, the part of the
     # spin in them changes no tilt and would be taken for more and more of it
-    turns = vehicle.follows_course
     _euler_rates(x_next, roll)
-    if rarely(turns):
-        roll[2] = 0.0
-        # the body's own rate, until the end of the step
-        x_next[S.WZ] -= math.tan(x_next[S.PHI]) * x_next[S.WY]
     first[_ROLL_RATE] += math.sin(x_next[S.THETA]) * roll[2]
     first[_PITCH_RATE] -= math.sin(x_next[S.PHI]) * math.cos(x_next[S.THETA]) * roll[2]
     correction = 0.0
     charge = 0.0
     energy = 0.0
     for step in range(steps):
-        if rarely(turns):
-            _turning_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
-        else:
-            _attitude_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
+        _attitude_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
         # upright in the middle of the substep
-        _attitude_rates(vehicle, x_next, roll)
+        _euler_rates(x_next, roll)
         upright = math.cos(x_next[S.PHI] + 0.5 * h * roll[0])
         upright *= math.cos(x_next[S.THETA] + 0.5 * h * roll[1])
         thrust = (vehicle.weight_N + u[S.LIFT]) / max(upright, _UPRIGHT_MIN)
@@ -324,7 +254,7 @@ def plant_step(vehicle, x, u, x_next):
             thrust,
             x_next[S.PHI],
             x_next[S.THETA],
-            0.0 if turns else x_next[S.PSI],
+            x_next[S.PSI],
             x_next[S.VX],
             x_next[S.VY],
             x_next[S.VZ],
@@ -341,7 +271,9 @@ def plant_step(vehicle, x, u, x_next):
             torque[axis] *= vehicle.thrust_factor
         thrust *= vehicle.thrust_factor
         _integrate(vehicle, x_next, h, thrust, torque, slope, total, middle)
-    if rarely(turns):
-        x_next[S.WZ] = _turn_rate(x_next)
+    if rarely(vehicle.follows_course):
+        u[S.TAU_Z] = yaw_torque
+        x_next[S.PSI], x_next[S.WZ] = psi, yaw_rate
+        turn(vehicle, x_next, u)
     u[S.DELTA_THRUST] = correction / steps
     return energy / charge, charge / vehicle.dt_s
