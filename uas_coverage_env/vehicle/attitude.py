@@ -4,6 +4,8 @@ A state says pitch, then roll, then the turn about the body's own axis (`layout`
 say yaw, then pitch, then roll.
 """
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -11,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from uas_coverage_env.vehicle import layout as S
 
 FloatArray = NDArray[np.float64]
+_Axes = Literal["YXZ", "ZYX"]
 
 
 def body_attitude(x: FloatArray) -> FloatArray:
@@ -32,7 +35,7 @@ def tilts_and_turn(attitude_rad: FloatArray) -> FloatArray:
     return np.stack([phi, theta, _near(psi, attitude_rad[..., 2])], axis=-1)
 
 
-def _turned(before: str, angles_rad: FloatArray, after: str) -> FloatArray:
+def _turned(before: _Axes, angles_rad: FloatArray, after: _Axes) -> FloatArray:
     """(3, ...) the angles about the axes `after` of the same rotation."""
     rotation = Rotation.from_euler(before, angles_rad.reshape(-1, 3))
     return np.moveaxis(rotation.as_euler(after).reshape(angles_rad.shape), -1, 0)

@@ -53,7 +53,36 @@ def is_absent(value: object) -> bool:
     return value == () or (isinstance(value, float) and math.isnan(value))
 
 
-class Airframe(StrictModel):
+class RecordedPart(StrictModel):
+    """A part whose numbers the kernels read, each under its name in `_IN_RECORD` or its own."""
+
+    @classmethod
+    def record_fields(cls) -> list[tuple[str, str]]:
+        """Names and types in the record of a vehicle."""
+        kinds = {float: "f8", int: "i8"}
+        return [
+            (_IN_RECORD.get(name, name), kinds[field.annotation])
+            for name, field in cls.model_fields.items()
+            if field.annotation in kinds
+        ]
+
+    def in_record(self) -> dict[str, float]:
+        """Values by their names in the record of a vehicle."""
+        numbers = ((name, value) for name, value in self if isinstance(value, float | int))
+        return {_IN_RECORD.get(name, name): value for name, value in numbers}
+
+
+_IN_RECORD = {
+    "speed_max_radps": "motor_speed_max_radps",
+    "resistance_ohm": "motor_resistance_ohm",
+    "constant_loss_W": "esc_loss_W",
+    "efficiency": "esc_efficiency",
+    "angular_acceleration_xy_max_radps2": "alpha_xy_max_radps2",
+    "angular_acceleration_z_max_radps2": "alpha_z_max_radps2",
+}
+
+
+class Airframe(RecordedPart):
     """Rigid body and rotor arrangement (the paper's Assumption 1: rotors equally spaced).
 
     Neighbouring rotors turn against each other. Three rotors cannot balance their yaw torque that
@@ -70,7 +99,7 @@ class Airframe(StrictModel):
     drag_vertical_kgps: Slope
 
 
-class Rotor(StrictModel):
+class Rotor(RecordedPart):
     """One rotor with its propeller; full throttle is computed where it is left out."""
 
     thrust_N_per_radps2: Annotated[float, _within(1e-12, 1.0)]
@@ -82,7 +111,7 @@ class Rotor(StrictModel):
     speed_max_radps: Annotated[float, _computed(1.0, 100_000.0)] = ABSENT
 
 
-class Motor(StrictModel):
+class Motor(RecordedPart):
     """One brushless motor, its speed controller's resistance included."""
 
     back_emf_Vs_per_rad: Annotated[float, _within(1e-6, 10.0)]
@@ -90,7 +119,7 @@ class Motor(StrictModel):
     no_load_current_A: Annotated[float, _within(0.0, 1000.0)]
 
 
-class Esc(StrictModel):
+class Esc(RecordedPart):
     """One electronic speed controller."""
 
     constant_loss_W: Annotated[float, _within(0.0, 1e5)]
@@ -214,7 +243,7 @@ class Battery(StrictModel):
         )
 
 
-class Limits(StrictModel):
+class Limits(RecordedPart):
     """Bounds of states and inputs (the paper's sets X and U)."""
 
     v_xy_max_mps: Speed_mps
@@ -242,7 +271,7 @@ class Limits(StrictModel):
         return self
 
 
-class ThrustCorrection(StrictModel):
+class ThrustCorrection(RecordedPart):
     """Slopes of the piecewise-linear thrust correction f_T, see `thrust_correction`.
 
     Those that are left out are fitted to the exact form.
@@ -295,23 +324,9 @@ class Parts(StrictModel):
 
     def kernel_scalars(self) -> dict[str, float]:
         """Body, rotors, motors and speed controllers under the names that the kernels read."""
-        renamed = {
-            "speed_max_radps": "motor_speed_max_radps",
-            "resistance_ohm": "motor_resistance_ohm",
-            "constant_loss_W": "esc_loss_W",
-            "efficiency": "esc_efficiency",
-        }
-        left_out = {"first_arm_angle_rad", "inertia_kgm2"}
-        return {
-            "weight_N": self.weight_N,
-            "auxiliary_W": self.power.auxiliary_W,
-            **{
-                renamed.get(name, name): value
-                for section in (self.airframe, self.rotor, self.motor, self.esc)
-                for name, value in section
-                if name not in left_out
-            },
-        }
+        sections = (self.airframe, self.rotor, self.motor, self.esc)
+        values = {"weight_N": self.weight_N, "auxiliary_W": self.power.auxiliary_W}
+        return values | {k: v for section in sections for k, v in section.in_record().items()}
 
     @cached_property
     def torque_max_Nm(self) -> tuple[float, float, float]:

@@ -13,14 +13,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     WayHome,
 )
 from uas_coverage_env.geometry import cylinder_faces
-from uas_coverage_env.vehicle import (
-    DELTA_THRUST,
-    DOD,
-    U_TH,
-    LinearModel,
-    VehicleParams,
-    dod_per_s,
-)
+from uas_coverage_env.vehicle import LinearModel, VehicleParams, dod_per_s
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import (
     MILP_RESERVE,
     flight_seconds,
@@ -30,7 +24,7 @@ from uas_coverage_env.vehicle.range import (
 )
 
 FloatArray = NDArray[np.float64]
-_BATTERY = [DOD, U_TH]
+_BATTERY = [S.DOD, S.U_TH]
 _ALLOWANCE_S = 16.0  # braking to a hover where the plan ends, and turning
 
 SETTLING_S = _ALLOWANCE_S + MILP_RESERVE.landing_s
@@ -78,7 +72,7 @@ class BatteryReserve:
             milp.subject_to(
                 f"reserve.{name}",
                 (faces, v.position[uas, -1][None, :]),
-                (gain / rate, v.u[uas, :, DELTA_THRUST][None, :]),
+                (gain / rate, v.u[uas, :, S.DELTA_THRUST][None, :]),
                 (-1.0, short[None, :]),
                 upper=room,
                 where=excess > 0.0,
@@ -111,7 +105,7 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
         allowance: whether it still has to brake to a hover.
     """
     way_s = float((_time_faces(problem, uas) @ (x[:3] - _towards_m(problem, uas))).max())
-    spent_s = float(x[DOD]) / _rate(problem, uas)
+    spent_s = float(x[S.DOD]) / _rate(problem, uas)
     result = spent_s + way_s - _room_s(problem, uas)
     return result if allowance else result - _ALLOWANCE_S
 
@@ -174,7 +168,7 @@ def _time_faces(problem: PlanningProblem, uas: int) -> FloatArray:
 
 def _last_dod(model: LinearModel, battery: FloatArray, horizon: int) -> tuple[float, FloatArray]:
     """DoD(N) = start + gain · Delta T, from the battery's rows of the dynamics; gain (N,)."""
-    A, B, E = model.A[np.ix_(_BATTERY, _BATTERY)], model.B[_BATTERY, DELTA_THRUST], model.E
+    A, B, E = model.A[np.ix_(_BATTERY, _BATTERY)], model.B[_BATTERY, S.DELTA_THRUST], model.E
     gain, later = np.empty(horizon), np.eye(2)
     start = battery
     for n in range(horizon):
