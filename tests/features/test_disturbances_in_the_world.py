@@ -14,8 +14,8 @@ from uas_coverage_env.scenario import Scenario, Wind
 from uas_coverage_env.scenario.toml_text import toml_text
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.vehicle import DOD, LIFT, TAU_X, THETA, VX, VY, VZ, X, Y, Z
-from uas_coverage_env.vehicle.compiled import compile_vehicle
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
+from uas_coverage_env.vehicle.record import compile_vehicle
 from uas_coverage_env.world import Velocity, Wrench
 
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])

@@ -10,6 +10,7 @@ from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import height_above_ground_m, take_off
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import DOD, U_TH, load_vehicle
+from uas_coverage_env.vehicle.battery import BatteryState
 from uas_coverage_env.vehicle.vertical_flight import vertical_flight
 from uas_coverage_env.world import GoTo, Velocity
 
@@ -29,18 +30,18 @@ class HomeAtOnce:
 
 
 def test_climbing_takes_more_power_than_hovering_and_descending_less():
-    up, down = (vertical_flight(S500, 30.0, v, 0.2, 0.1) for v in (-3.0, 1.5))
+    up, down = (vertical_flight(S500, 30.0, v, BatteryState(0.2, (0.1,))) for v in (-3.0, 1.5))
     assert (up.time_s, down.time_s) == (10.0, 20.0)
     powers = [3600.0 * flown.energy_Wh / flown.time_s for flown in (down, up)]
     assert powers[0] < S500.power.hover_W < powers[1]
 
 
 def test_the_charge_drawn_is_the_energy_over_the_voltage():
-    flown = vertical_flight(S500, 60.0, -3.0, 0.3, 0.0)
-    volts = flown.energy_Wh / (S500.battery.capacity_Ah * (flown.dod - 0.3))
+    flown = vertical_flight(S500, 60.0, -3.0, BatteryState.rested(S500.battery, 0.3))
+    volts = flown.energy_Wh / (S500.battery.capacity_Ah * (flown.battery.dod - 0.3))
     assert S500.battery.voltage_min_V < volts < S500.battery.ocv_V[0]
-    assert flown.u_th_V > 0.0
-    assert vertical_flight(S500, 0.0, -3.0, 0.3, 0.1) == (0.0, 0.0, 0.3, 0.1)
+    assert flown.battery.pairs_V[0] > 0.0
+    assert vertical_flight(S500, 0.0, -3.0, flown.battery) == (0.0, 0.0, flown.battery)
 
 
 def test_a_mission_from_the_ground_begins_with_what_take_off_leaves():
@@ -48,7 +49,7 @@ def test_a_mission_from_the_ground_begins_with_what_take_off_leaves():
     assert World(plain).state.x[0, DOD] == pytest.approx(0.1)
     grounded = from_ground(plain)
     start = World(grounded).state.x[0]
-    assert start[DOD] == take_off(grounded, 0).dod > 0.1
+    assert start[DOD] == take_off(grounded, 0).battery.dod > 0.1
     assert start[U_TH] > 0.0
     assert first_sight(MissionBrief.of(grounded)).x[0, DOD] == start[DOD]
 

@@ -13,7 +13,7 @@ import numpy as np
 from pymavlink import mavwp
 
 from uas_coverage_env.mission.leg_model import DT_S, Autopilot, Followed, follow
-from uas_coverage_env.vehicle.derived import steady_current_A
+from uas_coverage_env.vehicle.battery import steady_current_A
 from uas_coverage_env.vehicle.range import level_power_W
 
 WAYPOINT, LAND, TAKE_OFF, DELAY, YAW, SPEED = 16, 21, 22, 93, 115, 178

@@ -17,10 +17,10 @@ from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
 from uas_coverage_env.vehicle.battery import (
     BatterySegment,
     battery_segments,
-    polarisation_decay,
+    pair_decays,
 )
-from uas_coverage_env.vehicle.compiled import PHYSICAL_SIDES
 from uas_coverage_env.vehicle.limits import LPV_TOLERANCE
+from uas_coverage_env.vehicle.record import PHYSICAL_SIDES
 
 WITHIN = 1.0 + LPV_TOLERANCE
 """Share of a limit up to which a flight counts as keeping it."""
@@ -32,8 +32,8 @@ INSCRIBED = math.cos(math.pi / PHYSICAL_SIDES)
 _SLAB = 0.02
 """Widest range of the depth of discharge that one minorant holds for."""
 
-_BASE, _HORIZONTAL, _POLARISATION, _VERTICAL = range(4)
-"""Variables of a minorant; from _VERTICAL on one for each slab."""
+_BASE, _HORIZONTAL, _PAIRS = range(3)
+"""Variables of a minorant; from _PAIRS on one for each RC pair, then one for each slab."""
 
 _LIKELY = 2.5
 """What speed and tilt mostly add to the thrust, over what full speed adds."""
@@ -81,15 +81,15 @@ class _Ranges(NamedTuple):
 class _Minorant(NamedTuple):
     """Power >= base_W + vertical_W_per_N vertical_N + horizontal_W_per_N horizontal_N.
 
-    Less polarisation_A times what the polarisation is going to rise by. The price of the vertical
-    part is another for each slab of the depth of discharge.
+    Less pairs_A times what the polarisation of each RC pair is going to rise by. The price of the
+    vertical part is another for each slab of the depth of discharge.
     """
 
     base_W: float
     vertical_W_per_N: list[float]
     horizontal_W_per_N: float
-    polarisation_A: float
-    """Price of a rise of the polarisation."""
+    pairs_A: list[float]
+    """Prices of a rise of the polarisation, of each RC pair."""
 
 
 STEPS = Prices(step=1.0, mps=0.0, rad=0.0, once=0.0)
@@ -134,17 +134,26 @@ def energy_prices(vehicle: VehicleParams, ends: Ends, dod_max: float) -> Prices:
         once=dt_s
         * (
             _vertical_W(vehicle, ends, slopes[0], minorant.vertical_W_per_N)
-            + _polarisation_W(vehicle, ends.dt_s, minorant.polarisation_A)
+            + _polarisation_W(vehicle, ends.dt_s, minorant.pairs_A)
         ),
     )
 
 
-def _polarisation_W(vehicle: VehicleParams, dt_s: float, price_A: float) -> float:
+def _polarisation_W(vehicle: VehicleParams, dt_s: float, prices_A: Sequence[float]) -> float:
     """What the polarisation makes a flight cheaper by than its settled value, over dt, at most."""
-    battery = vehicle.battery
-    largest_V = battery.resistance_th_ohm * WITHIN * battery.current_max_A
-    rises = 1.0 - polarisation_decay(vehicle, dt_s)
-    return (price_A + 0.5 * largest_V / battery.resistance_th_ohm) * largest_V / rises
+    total_W, decays = 0.0, pair_decays(vehicle, dt_s)
+    for pair, largest_V, decay, price_A in zip(
+        vehicle.battery.pairs, _largest_V(vehicle), decays, prices_A, strict=True
+    ):
+        rise_W = (price_A + 0.5 * largest_V / pair.resistance_ohm) * largest_V
+        total_W += rise_W / (1.0 - decay)
+    return total_W
+
+
+def _largest_V(vehicle: VehicleParams) -> list[float]:
+    """The polarisation of each RC pair under the largest current."""
+    most_A = WITHIN * vehicle.battery.current_max_A
+    return [pair.resistance_ohm * most_A for pair in vehicle.battery.pairs]
 
 
 def _vertical_W(
@@ -172,19 +181,20 @@ def _minorant(vehicle: VehicleParams, ranges: _Ranges, dod_max: float) -> _Minor
     What bounds the power from below is concave in each variable alone, hence above a linear
     function wherever it is so at all corners.
     """
-    battery = vehicle.battery
-    u_th_V = 0.0, battery.resistance_th_ohm * WITHIN * battery.current_max_A
+    pairs_V = list(product(*((0.0, most_V) for most_V in _largest_V(vehicle))))
+    vertical_from = _PAIRS + len(vehicle.battery.pairs)
     slabs = list(_slabs(vehicle, dod_max))
     rows, powers_W = [], []
     for n, (segment, dod) in enumerate(slabs):
         for vertical, horizontal in product(ranges.vertical_N, ranges.horizontal_N):
-            for depth, u in product(dod, u_th_V):
-                power_W, excess_V = _settled(vehicle, segment, depth, u, vertical + horizontal)
-                row = np.zeros(_VERTICAL + len(slabs))
-                row[:_VERTICAL], row[_VERTICAL + n] = (1.0, horizontal, -excess_V), vertical
+            for depth, volts in product(dod, pairs_V):
+                power_W, rises_V = _settled(vehicle, segment, depth, volts, vertical + horizontal)
+                row = np.zeros(vertical_from + len(slabs))
+                row[:vertical_from] = 1.0, horizontal, *(-rise_V for rise_V in rises_V)
+                row[vertical_from + n] = vertical
                 rows.append(row)
                 powers_W.append(power_W)
-    cost = np.zeros(_VERTICAL + len(slabs))
+    cost = np.zeros(vertical_from + len(slabs))
     cost[_BASE], cost[_HORIZONTAL] = -1.0, -ranges.likely_N
     positive = (0.0, None)
     found: Any = linprog(
@@ -194,9 +204,9 @@ def _minorant(vehicle: VehicleParams, ranges: _Ranges, dod_max: float) -> _Minor
         raise ValueError(f"the power of {vehicle.name!r} has no linear minorant")
     return _Minorant(
         base_W=float(found.x[_BASE]),
-        vertical_W_per_N=found.x[_VERTICAL:].tolist(),
+        vertical_W_per_N=found.x[vertical_from:].tolist(),
         horizontal_W_per_N=float(found.x[_HORIZONTAL]),
-        polarisation_A=float(found.x[_POLARISATION]),
+        pairs_A=found.x[_PAIRS:vertical_from].tolist(),
     )
 
 
@@ -214,16 +224,23 @@ def _slabs(
 
 
 def _settled(
-    vehicle: VehicleParams, segment: BatterySegment, dod: float, u_th_V: float, thrust_N: float
-) -> tuple[float, float]:
-    """The power behind both resistances, and by how much the polarisation is going to rise."""
+    vehicle: VehicleParams,
+    segment: BatterySegment,
+    dod: float,
+    pairs_V: Sequence[float],
+    thrust_N: float,
+) -> tuple[float, list[float]]:
+    """The power behind all resistances, and by how much each polarisation is going to rise."""
     battery = vehicle.battery
-    drop_V = segment.ocv_slope_V * dod + u_th_V - segment.drop_V
+    drop_V = segment.ocv_slope_V * dod + sum(pairs_V) - segment.drop_V
     current_A = segment.current_A + segment.current_A_per_V * drop_V
     current_A += segment.current_A_per_N * thrust_N
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
     open_V = segment.ocv_V - segment.ocv_slope_V * dod
-    if not 0.0 < current_A < 0.5 * open_V / resistance_ohm:
+    if not 0.0 < current_A < 0.5 * open_V / battery.resistance_ohm:
         raise ValueError(f"{vehicle.name!r} may draw {current_A:.3g} A, which has no bound here")
-    power_W = (open_V - resistance_ohm * current_A) * current_A
-    return power_W, battery.resistance_th_ohm * current_A - u_th_V
+    power_W = (open_V - battery.resistance_ohm * current_A) * current_A
+    rises_V = (
+        pair.resistance_ohm * current_A - volt
+        for pair, volt in zip(battery.pairs, pairs_V, strict=True)
+    )
+    return power_W, list(rises_V)

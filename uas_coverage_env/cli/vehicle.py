@@ -170,11 +170,16 @@ def _lines(params: VehicleParams) -> list[str]:
     battery, power = params.battery, params.power
     flown = endurance(params)
     left = f"{1 - battery.dod_max:.0%}"
+    pairs = ", ".join(
+        f"{1e3 * pair.resistance_ohm:.3g} mohm of {pair.time_constant_s:.3g} s"
+        for pair in battery.pairs
+    )
     lines = [
         f"weight     {params.weight_N:.4g} N, full throttle lifts {flown.thrust_to_weight:.2f} "
         "times as much",
         f"battery    {battery.capacity_Ah:g} Ah at {battery.voltage_nominal_V:.4g} V; hover takes "
         f"{flown.hover_current_A:.3g} of {battery.current_max_A:.3g} A at {left} charge",
+        f"RC pairs   {pairs}",
         f"hover      {power.hover_W:.4g} W, {flown.hover_min:.1f} min to empty, "
         f"{flown.hover_usable_min:.1f} min to {left}",
     ]

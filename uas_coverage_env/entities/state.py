@@ -102,7 +102,8 @@ class WorldState(NamedTuple):
     packs: Annotated[NDArray[np.void], PACK_STATE_DTYPE, "B"]
     """Of each UAS; of none where none swaps on its own."""
     true_vehicles: Annotated[NDArray[np.void], VEHICLE_DTYPE, "true vehicles"]
-    """What each UAS flies, where features make that another than is believed; else none."""
+    """What each UAS flies, where features make that another than is believed or its battery has
+    further RC pairs, whose voltages are in it; else none."""
     due_step: Annotated[NDArray[np.int64], "repeats", Values(0, 2**40)]
     """The sample at which each waypoint that was covered is asked for again, 0 where it is not; of
     none where no waypoint is to be covered more than once."""

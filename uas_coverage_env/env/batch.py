@@ -412,7 +412,9 @@ class CoverageBatch:
         called = assistants(settings.return_mode, settings.safety_filter, goes_to=goes_to)
         paying = paying_of(settings.reward, settings.weights)
         nonlinear = settings.dynamics == "nonlinear"
-        code = feature_code(self.pool.features, nonlinear=nonlinear)
+        code = feature_code(
+            self.pool.features, otherwise=nonlinear or self.pool.sizes["true vehicles"] > 0
+        )
         rules = Rules(acting_of(kind), nonlinear, called, code, paying, self._observing)
         # `_draw_next` comes between the end of a mission and the next
         begins_later = self._begins_here and self.autoreset == SAME_STEP

@@ -14,7 +14,7 @@ from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.scenes import scenes_in
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle.compiled import COUNTS
+from uas_coverage_env.vehicle.record import COUNTS
 
 
 def checked(

@@ -107,7 +107,10 @@ class CudaMissions:
             )
         acting = acting_of(given.kind, on_gpu=True)
         write_own = given.kind.write if is_own(acting) else None
-        self._launched = step_with(write_own, pool.features, given.dynamics == "nonlinear")
+        self._launched = step_with(
+            write_own, pool.features, given.dynamics == "nonlinear",
+            pool.sizes["true vehicles"] > 0,
+        )  # fmt: skip
         paying = paying_of(DEFAULT_REWARD, given.weights)
         observing = observing_of(OBSERVATION)
         self._pool = pool

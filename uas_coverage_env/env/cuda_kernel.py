@@ -193,12 +193,13 @@ def _write_with(write: Any) -> Any:
 
 
 @cache  # to compile it again takes seconds
-def _fly_with(features: tuple[Feature, ...], nonlinear: bool) -> Any:
+def _fly_with(features: tuple[Feature, ...], nonlinear: bool, has_true_vehicles: bool) -> Any:
     """Fly and judge a step with what the features do."""
     command, act, moved, judged, sensed = (
         called_at(point, features) for point in Point if point != Point.BEGIN
     )
-    otherwise = nonlinear or any(feature.disturbs for feature in features)
+    disturbed = any(feature.disturbs for feature in features)
+    otherwise = nonlinear or has_true_vehicles or disturbed
 
     @kernel
     def fly_step(pool, missions, lane):
@@ -240,18 +241,21 @@ def _step_of(write: Any, begin: Any, fly: Any) -> Any:
     return step
 
 
-def step_with(write: Any, features: tuple[Feature, ...], nonlinear: bool) -> Any:
+def step_with(
+    write: Any, features: tuple[Feature, ...], nonlinear: bool, has_true_vehicles: bool
+) -> Any:
     """The step of all lanes, to be launched.
 
     Args:
         write: The kernel of a kind of action of one's own; None: it is one of the package.
         features: What the mission has of what few missions have.
         nonlinear: Whether the 6-DOF plant is flown.
+        has_true_vehicles: Whether others are flown than are believed.
     """
     return _step_of(
         _write_as_usual if write is None else _write_with(write),
         called_at_begin(features),
-        _fly_with(features, nonlinear),
+        _fly_with(features, nonlinear, has_true_vehicles),
     )
 
 

@@ -18,7 +18,7 @@ from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.features.feature import fitted_to, in_slots, memory_words
 from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
 from uas_coverage_env.simulation.scenes import changes_scene
-from uas_coverage_env.world.arena import ARENA, Arena
+from uas_coverage_env.world.arena import ARENA, Arena, has_true_vehicles
 from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.packs import swaps_alone
 from uas_coverage_env.world.sensing import senses
@@ -66,8 +66,10 @@ class DrawnPool:
         self.sizes["memory words"] = memory_words(self.features, source.room.n_uas)
         swaps = any(swaps_alone(scenario) for scenario in source.examples)
         self.sizes["B"] = source.room.n_uas if swaps else 0
-        perturbed = any(feature.perturbs for feature in self.features)
-        self.sizes["true vehicles"] = source.room.n_uas if perturbed else 0
+        differ = any(
+            has_true_vehicles(each, settings.features_in(each)) for each in source.examples
+        )
+        self.sizes["true vehicles"] = source.room.n_uas if differ else 0
         repeats = any(scenario.asks_again for scenario in source.examples)
         self.sizes["repeats"] = self.sizes["W"] if repeats else 0
         self.changes = any(changes_scene(scenario) for scenario in source.examples)
@@ -127,12 +129,13 @@ class DrawnPool:
             scenario = chosen[lane] if chosen else None
             before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
             scenario = scenario or self._source.draw(rng)
-            fitted_to(self.features, self.settings.features_in(scenario))
-            self._check_events(scenario)
+            own = self.settings.features_in(scenario)
+            fitted_to(self.features, own)
+            self._check_events(scenario, has_true_vehicles(scenario, own))
             missions.append(DrawnMission(lane, scenario, before, rng))
         self.install(missions)
 
-    def _check_events(self, scenario: Scenario) -> None:
+    def _check_events(self, scenario: Scenario, differs: bool) -> None:
         """Refuse more events, or others, than there is room for."""
         n_events, n_sensed = len(scenario.events), len(scenario.uas) * senses(scenario)
         if (
@@ -141,6 +144,7 @@ class DrawnPool:
             or goes_home(scenario) > self.goes_home
             or swaps_alone(scenario) > (self.sizes["B"] > 0)
             or scenario.asks_again > (self.sizes["repeats"] > 0)
+            or differs > (self.sizes["true vehicles"] > 0)
             or changes_scene(scenario) > self.changes
         ):
             raise ValueError(

@@ -124,7 +124,9 @@ class Episode:
         called = assistants(world.return_mode, world.safety_filter, goes_to=goes_to)
         # what the kernel is given in every step: the arrays are written in place
         nonlinear = world.dynamics == "nonlinear"
-        code = feature_code(world.features, nonlinear=nonlinear)
+        code = feature_code(
+            world.features, otherwise=nonlinear or len(world.state.true_vehicles) > 0
+        )
         at = np.array([*addresses, len(called), *called, *code])
         self._given = (at, nonlinear)
         seen = self.observation

@@ -22,7 +22,7 @@ from uas_coverage_env.flight.loop import Progress, rollout
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import VX, VY, X, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import FLYING, SwarmState
 
 UNKNOWN_CHOICE = -1
@@ -159,7 +159,7 @@ def _rows_of(
     swarm, observation, candidates = seen[k]
     flies = np.flatnonzero(swarm.status == FLYING)
     after = seen[k + 1][0].x[flies]
-    asked = np.column_stack([after[:, VX], after[:, VY], -after[:, Z]])
+    asked = np.column_stack([after[:, S.VX], after[:, S.VY], -after[:, S.Z]])
     offered = candidates[flies] >= 0
     wanted = next_covered[flies, None]
     is_next = (candidates[flies] == wanted) & offered
@@ -195,7 +195,7 @@ def _next_covered(scenario: Scenario, swarms: Sequence[SwarmState]) -> NDArray[n
         covers[k - 1] = covers[k]
         flew = before.status == FLYING
         for w in np.flatnonzero(before.uncovered & ~now.uncovered):
-            away_m = np.linalg.norm(now.x[:, X : X + 3] - at_m[w], axis=1)
+            away_m = np.linalg.norm(now.x[:, S.X : S.X + 3] - at_m[w], axis=1)
             away_m[~flew] = math.inf
             if np.isfinite(away_m).any():
                 covers[k - 1, away_m.argmin()] = w

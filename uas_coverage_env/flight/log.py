@@ -29,15 +29,8 @@ from uas_coverage_env.flight.record import (
 )
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import (
-    DOD,
-    LIMIT_NAMES,
-    N_INPUTS,
-    N_LIMITS,
-    U_TH,
-    open_circuit_V,
-    write_limited,
-)
+from uas_coverage_env.vehicle import LIMIT_NAMES, N_LIMITS, open_circuit_V, write_limited
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import CONTACT_NAMES, FLYING, SWAPPING, Command, command_mode
 from uas_coverage_env.world import LOST as IS_LOST
 
@@ -123,7 +116,7 @@ class FlightLog:
         x = np.array([sample.x for sample in samples])
         flies = self._flies()
         mode = self._mode(np.array([sample.status for sample in samples]), flies)
-        u = np.zeros((*mode.shape, N_INPUTS))
+        u = np.zeros((*mode.shape, S.N_INPUTS))
         current_A, voltage_V = np.zeros(mode.shape), np.zeros(mode.shape)
         for k, step in enumerate(self._steps):
             flying = mode[k] < LANDED
@@ -135,8 +128,10 @@ class FlightLog:
             # while nothing is drawn the battery shows what it has
             vehicle = self._world.arena.vehicles[i]
             for j in np.flatnonzero(~flies[:k, i]):
-                voltage_V[j, i] = open_circuit_V(vehicle, x[j, i, DOD]) - x[j, i, U_TH]
-            voltage_V[k:, i] = open_circuit_V(vehicle, x[k, i, DOD]) - x[k, i, U_TH]
+                voltage_V[j, i] = open_circuit_V(vehicle, x[j, i, S.DOD]) - x[j, i, S.U_TH]
+            voltage_V[k:, i] = open_circuit_V(vehicle, x[k, i, S.DOD]) - x[k, i, S.U_TH]
+            for true in self._world.state.true_vehicles[i : i + 1]:
+                voltage_V[k:, i] -= true["further_V"][: true["n_further"]].sum()
         return {
             **{"x": x, "u": u, "voltage_V": voltage_V, "current_A": current_A, "mode": mode},
             "covered": np.array([sample.covered for sample in samples], np.int64),

@@ -141,7 +141,7 @@ def ground_phases(flight: FlightRecord) -> list[dict[str, Any]]:
             entry["landing_s"] = sum(down.time_s for down in downs)
             entry["landing_Wh"] = sum(down.energy_Wh for down in downs)
         if flight.mode[-1, i] == LANDED:
-            entry["soc_on_ground"] = 1.0 - downs[-1].dod
+            entry["soc_on_ground"] = 1.0 - downs[-1].battery.dod
         entries.append(entry)
     return entries
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.entities.codes import ContactKind
 from uas_coverage_env.flight.of_log import OfLog
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, LIMITS, PHI, WX, body_attitude
+from uas_coverage_env.vehicle import LIMITS, body_attitude
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import CONTACT_NAMES
 
 MODES = ("covering", "transit", "return", "landed", "lost")
@@ -291,7 +292,7 @@ class FlightRecord:
     @property
     def soc(self) -> NDArray[np.float64]:
         """(T, U) state of charge, 0..1."""
-        return 1.0 - self.x[..., DOD]
+        return 1.0 - self.x[..., S.DOD]
 
     @property
     def resting(self) -> NDArray[np.bool_]:
@@ -315,7 +316,7 @@ class FlightRecord:
 
         These have their tilts in `x` on axes that do not turn, see `vehicle.layout`.
         """
-        angles = self.x[..., PHI:WX].copy()
+        angles = self.x[..., S.PHI : S.WX].copy()
         for i, uas in enumerate(self.scenario.uas):
             if uas.heading == "course":
                 angles[:, i] = body_attitude(self.x[:, i])

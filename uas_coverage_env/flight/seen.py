@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.flight.record import LANDED, FlightRecord
 from uas_coverage_env.scenario import Scenario, Sensor
-from uas_coverage_env.vehicle import PHI, PSI, THETA, VX, VZ, WX, Z
+from uas_coverage_env.vehicle import layout as S
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -127,13 +127,13 @@ def footprints_m(sensor: Sensor, x: FloatArray) -> FloatArray:
     corners = np.array([[ahead, aside], [ahead, -aside], [-ahead, -aside], [-ahead, aside]])
     rays = np.concatenate([corners, np.ones((4, 1))], axis=1)  # forward, right, down
     kept = 0.0 if sensor.stabilised else 1.0
-    rays = _turned(rays, kept * x[:, PHI], kept * x[:, THETA], x[:, PSI])
+    rays = _turned(rays, kept * x[:, S.PHI], kept * x[:, S.THETA], x[:, S.PSI])
     meets = rays[..., 2] > _LEVEL * np.linalg.norm(rays, axis=-1)
-    meets &= (x[:, Z] < 0.0)[:, None]
+    meets &= (x[:, S.Z] < 0.0)[:, None]
     if sensor.max_tilt_deg is not None:
-        tilt = np.arccos(np.clip(np.cos(x[:, PHI]) * np.cos(x[:, THETA]), -1.0, 1.0))
+        tilt = np.arccos(np.clip(np.cos(x[:, S.PHI]) * np.cos(x[:, S.THETA]), -1.0, 1.0))
         meets &= (tilt <= math.radians(sensor.max_tilt_deg))[:, None]
-    way = -x[:, None, Z] / np.where(meets, rays[..., 2], np.nan)
+    way = -x[:, None, S.Z] / np.where(meets, rays[..., 2], np.nan)
     places_m = x[:, None, :2] + way[..., None] * rays[..., :2]
     places_m[~meets.all(axis=1)] = np.nan
     return places_m
@@ -211,7 +211,7 @@ def _taken(flight: FlightRecord, samples: slice) -> dict[str, Iterator[_Picture]
     """Camera -> its pictures that count, in order of time."""
     x = flight.x[samples].copy()
     flies = (flight.mode[samples] < LANDED) & ~flight.resting[samples] & flight.known[samples]
-    x[..., PHI:WX] = flight.attitude_rad[samples]
+    x[..., S.PHI : S.WX] = flight.attitude_rad[samples]
     carried: dict[str, list[tuple[int, Sensor]]] = {}
     for i, uas in enumerate(flight.scenario.uas):
         for sensor in uas.sensors:
@@ -263,7 +263,7 @@ def _as_asked(scenario: Scenario, name: str, x: FloatArray) -> BoolArray:
     demands = {(w.heights_m, w.max_speed_mps) for w in scenario.waypoints if w.sensor == name}
     if not demands:
         return np.ones(len(x), np.bool_)
-    height_m, speed_mps = -x[:, Z], np.linalg.norm(x[:, VX : VZ + 1], axis=1)
+    height_m, speed_mps = -x[:, S.Z], np.linalg.norm(x[:, S.VX : S.VZ + 1], axis=1)
     fits = np.zeros(len(x), np.bool_)
     for heights_m, max_speed_mps in demands:
         lowest_m, highest_m = heights_m or (-math.inf, math.inf)

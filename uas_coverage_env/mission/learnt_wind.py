@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.belief import MOST_WIND, wind_growth
 from uas_coverage_env.entities.state import N_BELIEF, WIND
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY, WX, WY, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
-from uas_coverage_env.vehicle.layout import RATE, SPEED
 from uas_coverage_env.vehicle.tube import belief_gain
 from uas_coverage_env.world import FLYING, Arena, SwarmState
 
@@ -29,7 +28,7 @@ MEAN_HEIGHT_M = 20.0
 
 _MEAN_S = 30.0  # most turbulence is over sooner
 # north and east: state of the axis, and what of it is negative forward
-_STATES = ((X, VX, THETA, WY), (Y, VY, PHI, WX))
+_STATES = ((S.X, S.VX, S.THETA, S.WY), (S.Y, S.VY, S.PHI, S.WX))
 _FORWARD = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, 1.0, 1.0, 1.0]])
 
 
@@ -82,16 +81,16 @@ class LearntWind:
             if flying:
                 self._samples += 1
                 gain = max(self._mean_gain, 1.0 / self._samples)
-                grown = [wind_growth(-swarm.x[i, Z], MEAN_HEIGHT_M) for i in flying]
+                grown = [wind_growth(-swarm.x[i, S.Z], MEAN_HEIGHT_M) for i in flying]
                 wind_mps = (self.wind_mps[flying] / np.array(grown)[:, None]).mean(axis=0)
                 self.mean_mps += gain * (wind_mps - self.mean_mps)
 
     def _learn(self, i: int, before: FloatArray, now: FloatArray) -> None:
         A, B = self._axis[i]
-        alpha = (now[:, RATE] - before[:, RATE]) / B[RATE]  # whatever was flown
-        off_mps = now[:, SPEED] - (before @ A[SPEED] + B[SPEED] * alpha)
+        alpha = (now[:, S.RATE] - before[:, S.RATE]) / B[S.RATE]  # whatever was flown
+        off_mps = now[:, S.SPEED] - (before @ A[S.SPEED] + B[S.SPEED] * alpha)
         gain = max(self._gain, 1.0 / (1.0 + self._seen[i]))
         self._seen[i] += 1
         wind_mps = self.wind_mps[i]
-        wind_mps += gain * (off_mps / (1.0 - A[SPEED, SPEED]) - wind_mps)
+        wind_mps += gain * (off_mps / (1.0 - A[S.SPEED, S.SPEED]) - wind_mps)
         wind_mps *= min(1.0, self._most_mps[i] / max(float(np.hypot(*wind_mps)), 1e-9))

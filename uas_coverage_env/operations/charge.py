@@ -13,7 +13,11 @@ from uas_coverage_env.operations.homeward import Homeward
 from uas_coverage_env.operations.tracks import Track
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
-from uas_coverage_env.vehicle.derived import steady_current_A
+from uas_coverage_env.vehicle.battery import (
+    open_circuit_voltage,
+    steady_current_A,
+    steady_voltage_V,
+)
 from uas_coverage_env.vehicle.range import dod_per_s, level_power_W
 
 _LEAST_HEADWAY_MPS = 0.1
@@ -245,13 +249,11 @@ def _worn_soc(charge: Charged, soc_start: float, low: float) -> float:
 
 
 def _rest_V(vehicle: VehicleParams, soc: float) -> float:
-    battery = vehicle.battery
-    return float(np.interp(1.0 - soc, battery.ocv_dod, battery.ocv_V))
+    return float(open_circuit_voltage(vehicle, 1.0 - soc))
 
 
 def _loaded_V(vehicle: VehicleParams, soc: float) -> float:
     """Voltage in level flight at full speed [V]."""
-    battery = vehicle.battery
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    current_A = steady_current_A(battery, 1.0 - soc, level_power_W(vehicle))
-    return _rest_V(vehicle, soc) - resistance_ohm * current_A
+    battery, dod = vehicle.battery, 1.0 - soc
+    current_A = steady_current_A(battery, dod, level_power_W(vehicle))
+    return float(steady_voltage_V(battery, dod, current_A))

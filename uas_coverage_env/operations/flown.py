@@ -22,7 +22,8 @@ from uas_coverage_env.operations.frame import LocalFrame
 from uas_coverage_env.operations.logs import Logged
 from uas_coverage_env.operations.logs.flights import chosen_flight
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, N_STATES, PHI, VX, tilts_and_turn
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle import tilts_and_turn
 
 PLANNER = "log"
 """Name of the planner of what was flown elsewhere."""
@@ -226,8 +227,8 @@ class _Judged:
     def _states(self, i: int) -> FloatArray:
         """(M, 14) of UAS i at all moments."""
         uas = self._scenario.uas[i]
-        x = np.zeros((len(self._time_s), N_STATES))
-        x[:, DOD] = np.interp(self._time_s, self._grid_s, self.batteries[i].dod)
+        x = np.zeros((len(self._time_s), S.N_STATES))
+        x[:, S.DOD] = np.interp(self._time_s, self._grid_s, self.batteries[i].dod)
         if i not in self._ways:
             x[:, :3] = uas.start_m
             return x
@@ -235,12 +236,12 @@ class _Judged:
         at_s, half_s = self._log_s, 0.5 * self._scenario.dt_s
         x[:, :3] = way.places_at(at_s, start_m)
         moved_m = way.places_at(at_s + half_s, start_m) - way.places_at(at_s - half_s, start_m)
-        x[:, VX : VX + 3] = moved_m / (2.0 * half_s)
-        x[way.standing(at_s), VX : VX + 3] = 0.0
+        x[:, S.VX : S.VX + 3] = moved_m / (2.0 * half_s)
+        x[way.standing(at_s), S.VX : S.VX + 3] = 0.0
         attitude_rad = way.attitude_at(at_s)
         if attitude_rad is not None:
             turns = uas.heading == "course"
-            x[:, PHI : PHI + 3] = tilts_and_turn(attitude_rad) if turns else attitude_rad
+            x[:, S.PHI : S.PHI + 3] = tilts_and_turn(attitude_rad) if turns else attitude_rad
         return x
 
     def _known(self) -> NDArray[np.int8]:

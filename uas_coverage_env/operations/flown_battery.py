@@ -9,7 +9,7 @@ from uas_coverage_env.flight.of_log import Estimate
 from uas_coverage_env.operations.logs import Logged
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams, dod_per_s
-from uas_coverage_env.vehicle.battery import open_circuit_voltage
+from uas_coverage_env.vehicle.battery import steady_voltage_V
 
 FloatArray = NDArray[np.float64]
 
@@ -117,6 +117,4 @@ def _contradictions(log: Logged) -> list[str]:
 
 
 def _model_V(vehicle: VehicleParams, dod: FloatArray, current_A: FloatArray) -> FloatArray:
-    battery = vehicle.battery
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    return open_circuit_voltage(vehicle, dod) - resistance_ohm * current_A
+    return steady_voltage_V(vehicle.battery, dod, current_A)

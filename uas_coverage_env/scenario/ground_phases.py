@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from uas_coverage_env.scenario.unchecked import UncheckedScenario
+from uas_coverage_env.vehicle.battery import BatteryState, further_settled_V
 from uas_coverage_env.vehicle.vertical_flight import VerticalFlight, vertical_flight
 
 
@@ -31,13 +32,15 @@ def take_off(scenario: UncheckedScenario, i: int) -> VerticalFlight:
     uas, vehicle = scenario.uas[i], scenario.vehicles[i]
     height_m = height_above_ground_m(scenario, uas.start_m)
     climb_mps = -vehicle.limits.v_up_max_mps
-    return vertical_flight(vehicle, height_m, climb_mps, 1.0 - uas.soc_0, 0.0)
+    rested = BatteryState.rested(vehicle.battery, 1.0 - uas.soc_0)
+    return vertical_flight(vehicle, height_m, climb_mps, rested)
 
 
 def landing(
     scenario: UncheckedScenario, i: int, position_m: Sequence[float], dod: float, u_th_V: float
 ) -> VerticalFlight:
-    """From where UAS i has landed in the air to the ground."""
+    """From where UAS i has landed in the air to the ground; further RC pairs as in a hover."""
     vehicle = scenario.vehicles[i]
     height_m = height_above_ground_m(scenario, position_m)
-    return vertical_flight(vehicle, height_m, vehicle.limits.v_down_max_mps, dod, u_th_V)
+    battery = BatteryState(dod, (u_th_V, *further_settled_V(vehicle)))
+    return vertical_flight(vehicle, height_m, vehicle.limits.v_down_max_mps, battery)

@@ -42,6 +42,7 @@ from uas_coverage_env.vehicle import (
     push,
     reseed_reference,
 )
+from uas_coverage_env.vehicle.discharge import discharge_further
 
 
 @inlined_kernel
@@ -158,7 +159,7 @@ def fly(arena, state, nonlinear, code, outcome):
     """
     if code is None:
         fly_still(arena, state, outcome)
-    elif rarely(nonlinear or arena.rules[0].disturbed):
+    elif rarely(nonlinear or arena.rules[0].disturbed or state.true_vehicles.shape[0] > 0):
         fly_at(code[FLY], arena, state, nonlinear, code, outcome)
     else:
         fly_still(arena, state, outcome)
@@ -216,18 +217,20 @@ def move_all(arena, state, nonlinear, outcome):
             voltage_V, current_A = plant_step(flown, x, u, x)
         else:
             voltage_V, current_A = lpv_step(flown, x, u, x)
+        if flown.n_further > 0:
+            discharge_further(flown, flown.further_V, current_A, flown.dt_s)
         if disturbed:
             belief = state.uas[i].belief[:]
             _be_pushed(vehicle, flown, belief, event, state.step[0], dod_before, x)
         _note(arena, state, i, event, voltage_V, current_A)
 
 
-def feature_code(features: Sequence[Feature], *, nonlinear: bool = False) -> FeatureCode:
+def feature_code(features: Sequence[Feature], *, otherwise: bool = False) -> FeatureCode:
     """Compile the kernels of features, or load them from the cache.
 
     Args:
         features: In the order of `Arena.features`.
-        nonlinear: Whether the 6-DOF plant is flown.
+        otherwise: Whether the 6-DOF plant or true vehicles are flown, whatever features do.
 
     Raises:
         ValueError: One cannot be compiled.
@@ -240,6 +243,6 @@ def feature_code(features: Sequence[Feature], *, nonlinear: bool = False) -> Fea
             if point in feature.kernels:
                 calls += [f, signature.address_of(feature.kernels[point])]
         code.append(FIRST + len(calls))
-    otherwise = nonlinear or any(feature.disturbs for feature in features)
+    otherwise = otherwise or any(feature.disturbs for feature in features)
     fly = FLIGHT.address_of(fly_otherwise) if otherwise else 0
     return np.array([*code, fly, *calls], dtype=np.int64)

@@ -38,6 +38,7 @@ from uas_coverage_env.simulation.step import (
     step_world,
 )
 from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
+from uas_coverage_env.vehicle.battery import BatteryState
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.packs import (
@@ -67,19 +68,21 @@ def initial_state(
     sizes = {"U": n_uas, "W": len(scenario.waypoints), "E": len(scenario.events)}
     sizes |= {"S": n_uas if senses(scenario) else 0, "B": n_uas if swaps_alone(scenario) else 0}
     sizes["memory words"] = memory_words(features, n_uas)
-    sizes["true vehicles"] = 0 if arena is None else len(arena.perturbed)
+    sizes["true vehicles"] = 0 if arena is None else len(arena.true_uas)
     sizes["repeats"] = len(scenario.waypoints) if scenario.asks_again else 0
     state = STATE.zeros(sizes)
     state.x[:, :3] = [uas.start_m for uas in scenario.uas]
-    state.x[:, DOD] = [1.0 - uas.soc_0 for uas in scenario.uas]
-    if scenario.from_ground:
-        for i, x in enumerate(state.x):
-            flown = take_off(scenario, i)
-            x[DOD], x[U_TH] = flown.dod, flown.u_th_V
+    if arena is not None:
+        state.true_vehicles[:] = arena.vehicles[arena.true_uas]
+    for i, (uas, vehicle) in enumerate(zip(scenario.uas, scenario.vehicles, strict=True)):
+        battery = BatteryState.rested(vehicle.battery, 1.0 - uas.soc_0)
+        if scenario.from_ground:
+            battery = take_off(scenario, i).battery
+        state.x[i, DOD], (state.x[i, U_TH], *further_V) = battery
+        if further_V and len(state.true_vehicles):
+            state.true_vehicles["further_V"][i, : len(further_V)] = further_V
     state.uas["status"][:] = FLYING
     state.uncovered[:] = True
-    if arena is not None:
-        state.true_vehicles[:] = arena.vehicles[arena.perturbed]
     if len(state.measured):
         # where and how they start is known
         state.estimated[:] = state.measured[:] = state.observed[:] = state.x
@@ -229,7 +232,9 @@ class World:
     def _addresses(self) -> NDArray[np.int64]:
         """Of arena, state and what features do; they hold until the scene changes."""
         if not len(self._at):
-            code = feature_code(self.features, nonlinear=self._nonlinear)
+            code = feature_code(
+                self.features, otherwise=self._nonlinear or len(self.state.true_vehicles) > 0
+            )
             self._at = np.array([*MISSION.addresses_of(self.arena, self._state), *code])
         return self._at
 

@@ -8,9 +8,9 @@ from uas_coverage_env.vehicle.battery import (
     open_circuit_voltage,
     simulate_battery,
 )
-from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE, compile_vehicle
 from uas_coverage_env.vehicle.data_sheet import DataSheet
-from uas_coverage_env.vehicle.endurance import Endurance, endurance, flight_time_s
+from uas_coverage_env.vehicle.discharge import open_circuit_V
+from uas_coverage_env.vehicle.flight_time import Endurance, endurance, flight_time_s
 from uas_coverage_env.vehicle.inner_loop import (
     COURSE_SPEED_MPS,
     acceleration_wrench,
@@ -59,7 +59,6 @@ from uas_coverage_env.vehicle.lpv import (
     delta_thrust,
     fly_kinematics,
     lpv_step,
-    open_circuit_V,
 )
 from uas_coverage_env.vehicle.params import (
     VehicleParams,
@@ -67,8 +66,10 @@ from uas_coverage_env.vehicle.params import (
     return_threshold,
     vehicle_names,
 )
+from uas_coverage_env.vehicle.parts import RcPair
 from uas_coverage_env.vehicle.plant import plant_step
 from uas_coverage_env.vehicle.range import dod_per_s, margin_to_land, seconds_to_land
+from uas_coverage_env.vehicle.record import VEHICLE_DTYPE, compile_vehicle
 from uas_coverage_env.vehicle.sizing import MadeVehicle, make_vehicle
 from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_thrust_correction
 from uas_coverage_env.vehicle.true_vehicle import (
@@ -122,6 +123,7 @@ __all__ = [
     "LinearModel",
     "MadeVehicle",
     "Perturbation",
+    "RcPair",
     "VehicleParams",
     "X",
     "Y",

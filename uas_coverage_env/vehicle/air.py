@@ -10,14 +10,14 @@ models' translation is linear in it. Of the power, it has no part in this step.
 """
 
 from uas_coverage_env.compiled.kernels import inlined_kernel
-from uas_coverage_env.vehicle.layout import POSITION, SPEED, VX, VZ, X, Z
+from uas_coverage_env.vehicle import layout as S
 
 
 @inlined_kernel
 def enter_air(x, wind_mps):
     """Make the velocity of a state one relative to the air; wind_mps (3,) NED [m/s]."""
     for axis in range(3):
-        x[VX + axis] -= wind_mps[axis]
+        x[S.VX + axis] -= wind_mps[axis]
 
 
 @inlined_kernel
@@ -30,8 +30,8 @@ def leave_air(vehicle, x, wind_mps):
         wind_mps: (3,) NED [m/s].
     """
     for axis in range(3):
-        x[VX + axis] += wind_mps[axis]
-        x[X + axis] += vehicle.dt_s * wind_mps[axis]
+        x[S.VX + axis] += wind_mps[axis]
+        x[S.X + axis] += vehicle.dt_s * wind_mps[axis]
 
 
 @inlined_kernel
@@ -44,8 +44,8 @@ def push(vehicle, x, force_N):
         force_N: (3,) NED [N].
     """
     for axis in range(2):
-        x[X + axis] += vehicle.horizontal_force_B[POSITION] * force_N[axis]
-        x[VX + axis] += vehicle.horizontal_force_B[SPEED] * force_N[axis]
+        x[S.X + axis] += vehicle.horizontal_force_B[S.POSITION] * force_N[axis]
+        x[S.VX + axis] += vehicle.horizontal_force_B[S.SPEED] * force_N[axis]
     # lift is a force, too, but it acts upward
-    x[Z] -= vehicle.vertical_B[POSITION] * force_N[2]
-    x[VZ] -= vehicle.vertical_B[SPEED] * force_N[2]
+    x[S.Z] -= vehicle.vertical_B[S.POSITION] * force_N[2]
+    x[S.VZ] -= vehicle.vertical_B[S.SPEED] * force_N[2]

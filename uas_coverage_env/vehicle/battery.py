@@ -1,23 +1,56 @@
-"""The Thevenin battery: discharge curve, linearised current, replay of a current."""
+"""The Thevenin battery, and all that knows its inside; its kernels are in `discharge`.
+
+u_b = OCV(DoD) - sum of u_p - R_0 i behind any number of RC pairs, tau_p u_p' = R_p i - u_p. The
+first pair is the paper's, its voltage the state U_TH. Those of further pairs (`[[battery.rc]]`) are
+memory beside the state: `further_V` of the record that flies. What predicts with the nominal record
+or a linear model takes them as settled in a hover.
+"""
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uas_coverage_env.vehicle.parts import Battery, Parts, Power
+from uas_coverage_env.vehicle.parts import MAX_FURTHER_PAIRS, MAX_SEGMENTS, Battery, Parts, Power
 
 _SERIES_HOLDS = 2.0  # steps longer than this many time constants need the exponential itself
 _SOC_ROUNDING = 1e-9
+_DOD_POINTS = 201
+
+_f8, _i8 = "f8", "i8"
+RECORD_FIELDS = [
+    # a row per segment of the discharge curve
+    ("n_segments", _i8),
+    ("dod_end", _f8, (MAX_SEGMENTS,)),
+    ("ocv_V", _f8, (MAX_SEGMENTS,)),
+    ("ocv_slope_V", _f8, (MAX_SEGMENTS,)),
+    ("current_A", _f8, (MAX_SEGMENTS,)),
+    ("current_A_per_V", _f8, (MAX_SEGMENTS,)),
+    ("current_A_per_N", _f8, (MAX_SEGMENTS,)),
+    ("drop_V", _f8, (MAX_SEGMENTS,)),
+    ("capacity_As", _f8),
+    ("resistance_0_ohm", _f8),
+    ("resistance_th_ohm", _f8),
+    ("time_constant_th_s", _f8),
+    ("polarisation_decay", _f8),
+    ("hover_W", _f8),
+    # further RC pairs, and their voltages now
+    ("n_further", _i8),
+    ("further_resistance_ohm", _f8, (MAX_FURTHER_PAIRS,)),
+    ("further_time_constant_s", _f8, (MAX_FURTHER_PAIRS,)),
+    ("further_V", _f8, (MAX_FURTHER_PAIRS,)),
+]
+"""What the record of a vehicle holds of its battery."""
 
 
 class BatterySegment(NamedTuple):
     """One straight piece of the discharge curve and the current linearised on it.
 
-    OCV = ocv_V - ocv_slope_V DoD and
-    i_b = current_A + current_A_per_V (ocv_slope_V DoD + u_th - drop_V) + current_A_per_N dT.
+    OCV = ocv_V - ocv_slope_V DoD and, u the voltage of all RC pairs,
+    i_b = current_A + current_A_per_V (ocv_slope_V DoD + u - drop_V) + current_A_per_N dT.
     """
 
     dod_end: float
@@ -29,11 +62,39 @@ class BatterySegment(NamedTuple):
     drop_V: float
 
 
+class BatteryState(NamedTuple):
+    """A battery at a moment.
+
+    Attributes:
+        dod: Depth of discharge.
+        pairs_V: Voltages of its RC pairs, the paper's first [V].
+    """
+
+    dod: float
+    pairs_V: tuple[float, ...]
+
+    @classmethod
+    def rested(cls, battery: Battery, dod: float) -> "BatteryState":
+        """One from which nothing has been drawn for long."""
+        return cls(dod, (0.0,) * len(battery.pairs))
+
+    def after(self, battery: Battery, current_A: float, step_s: float) -> "BatteryState":
+        """The battery after a current, held over a step."""
+        left = [math.exp(-step_s / pair.time_constant_s) for pair in battery.pairs]
+        return BatteryState(
+            self.dod + current_A * step_s / (3600.0 * battery.capacity_Ah),
+            tuple(
+                kept * volt + (1.0 - kept) * pair.resistance_ohm * current_A
+                for kept, volt, pair in zip(left, self.pairs_V, battery.pairs, strict=True)
+            ),
+        )
+
+
 def battery_current_A(voltage_V: float, resistance_ohm: float, power_W: float) -> float:
     """Current at which a voltage behind a resistance delivers a power: (E - √(E² - 4RP)) / 2R [A].
 
     More power than it has is not delivered: then the current of its largest power flows, E / 2R.
-    Also compiled, as part of the power train.
+    Also compiled, see `discharge`.
     """
     root = math.sqrt(max(voltage_V * voltage_V - 4.0 * resistance_ohm * power_W, 0.0))
     return (voltage_V - root) / (2.0 * resistance_ohm)
@@ -82,6 +143,31 @@ def segment_at(vehicle: Parts, dod: float) -> BatterySegment:
     return next((s for s in segments if dod < s.dod_end), segments[-1])
 
 
+def write_battery(record: Any, vehicle: Parts, dt_s: float) -> None:
+    """Write `RECORD_FIELDS` of the record of a vehicle, the further pairs settled in a hover."""
+    battery, segments = vehicle.battery, battery_segments(vehicle)
+    record["n_segments"] = len(segments)
+    for row, segment in enumerate(segments):
+        for name, value in segment._asdict().items():
+            record[name][0, row] = value
+    record["capacity_As"] = 3600.0 * battery.capacity_Ah
+    for name in ("resistance_0_ohm", "resistance_th_ohm", "time_constant_th_s"):
+        record[name] = getattr(battery, name)
+    record["polarisation_decay"] = polarisation_decay(vehicle, dt_s)
+    record["hover_W"] = vehicle.power.hover_W
+    record["n_further"] = len(battery.rc)
+    for p, (pair, volt) in enumerate(zip(battery.rc, further_settled_V(vehicle), strict=True)):
+        record["further_resistance_ohm"][0, p] = pair.resistance_ohm
+        record["further_time_constant_s"][0, p] = pair.time_constant_s
+        record["further_V"][0, p] = volt
+
+
+def further_settled_V(vehicle: Parts) -> tuple[float, ...]:
+    """Voltages of the further pairs in a hover that has lasted for a while [V]."""
+    hover_A = vehicle.power.hover_W / vehicle.battery.voltage_nominal_V
+    return tuple(hover_A * pair.resistance_ohm for pair in vehicle.battery.rc)
+
+
 def open_circuit_voltage(vehicle: Parts, dod: ArrayLike) -> NDArray[np.float64]:
     """OCV(DoD), the discharge curve [V].
 
@@ -92,8 +178,44 @@ def open_circuit_voltage(vehicle: Parts, dod: ArrayLike) -> NDArray[np.float64]:
     Returns:
         (...) [V].
     """
-    battery = vehicle.battery
+    return _open_circuit_V(vehicle.battery, dod)
+
+
+def _open_circuit_V(battery: Battery, dod: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(np.interp(np.asarray(dod, float), battery.ocv_dod, battery.ocv_V))
+
+
+def steady_current_A(battery: Battery, dod: float, power_W: float) -> float:
+    """Current of a power that has been drawn for a while, all RC pairs settled [A]."""
+    open_V = float(_open_circuit_V(battery, dod))
+    return battery_current_A(open_V, battery.resistance_ohm, power_W)
+
+
+def steady_voltage_V(battery: Battery, dod: ArrayLike, current_A: ArrayLike) -> NDArray[np.float64]:
+    """Voltage under a current that has flowed for a while [V], of the shape of both."""
+    return _open_circuit_V(battery, dod) - battery.resistance_ohm * np.asarray(current_A)
+
+
+@lru_cache(maxsize=64)  # a vehicle is looked at again in every record that holds it
+def mean_voltage_V(battery: Battery, power_W: float, dod_end: float = 1.0) -> float:
+    """Mean voltage, by charge, while a power is drawn from a full battery until dod_end [V]."""
+    dod = np.linspace(0.0, dod_end, _DOD_POINTS)
+    current = np.array([steady_current_A(battery, depth, power_W) for depth in dod.tolist()])
+    return float(np.trapezoid(steady_voltage_V(battery, dod, current), dod)) / dod_end
+
+
+def around_hover(battery: Battery, hover_W: float) -> dict[str, Any]:
+    """Nominal voltage of a battery, and where the current is linearised for hover.
+
+    In the middle of each segment of the discharge curve, with the polarisation of a hover.
+    """
+    voltage_V = mean_voltage_V(battery, hover_W)
+    polarisation_ohm = sum(pair.resistance_ohm for pair in battery.pairs)
+    return {
+        "voltage_nominal_V": voltage_V,
+        "polarisation_linearised_V": polarisation_ohm * hover_W / voltage_V,
+        "ocv_dod_linearised": tuple(0.5 * (a + b) for a, b in pairwise(battery.ocv_dod)),
+    }
 
 
 def polarisation_decay(vehicle: Parts, dt_s: float, order: int = 4) -> float:
@@ -105,6 +227,12 @@ def polarisation_decay(vehicle: Parts, dt_s: float, order: int = 4) -> float:
     z = -dt_s / vehicle.battery.time_constant_th_s
     series = sum(z**k / math.factorial(k) for k in range(order + 1))
     return series if z >= -_SERIES_HOLDS and 0.0 < series < 1.0 else math.exp(z)
+
+
+def pair_decays(vehicle: Parts, dt_s: float, order: int = 4) -> tuple[float, ...]:
+    """What a step leaves of the voltage of each RC pair: `polarisation_decay` of the first."""
+    further = (math.exp(-dt_s / pair.time_constant_s) for pair in vehicle.battery.rc)
+    return (polarisation_decay(vehicle, dt_s, order), *further)
 
 
 def simulate_battery(
@@ -149,14 +277,13 @@ def simulate_battery(
             f"current_A takes the state of charge to {soc[sample]:.4g} at sample {sample}; "
             "end the series before, or correct soc_0"
         )
-    decay = polarisation_decay(vehicle, dt_s)
-    u_th = np.empty(len(current))
-    polarisation = 0.0
-    for k, amperes in enumerate(current.tolist()):
-        u_th[k] = polarisation
-        polarisation = decay * polarisation + (1.0 - decay) * battery.resistance_th_ohm * amperes
-    ocv = open_circuit_voltage(vehicle, 1.0 - soc)
-    return soc, ocv - u_th - battery.resistance_0_ohm * current
+    voltage_V = open_circuit_voltage(vehicle, 1.0 - soc)
+    for pair, decay in zip(battery.pairs, pair_decays(vehicle, dt_s), strict=True):
+        polarisation = 0.0
+        for k, amperes in enumerate(current.tolist()):
+            voltage_V[k] -= polarisation
+            polarisation = decay * polarisation + (1.0 - decay) * pair.resistance_ohm * amperes
+    return soc, voltage_V - battery.resistance_0_ohm * current
 
 
 def check_step(dt_s: float) -> None:

@@ -8,11 +8,14 @@ import math
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-import numpy as np
-
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.vehicle import derived
-from uas_coverage_env.vehicle.battery import segments_of
+from uas_coverage_env.vehicle.battery import (
+    around_hover,
+    segments_of,
+    steady_current_A,
+    steady_voltage_V,
+)
 from uas_coverage_env.vehicle.parts import (
     Battery,
     Parts,
@@ -52,7 +55,7 @@ def completed_battery(vehicle: Parts) -> Battery:
             f"battery.resistance_0_ohm {battery.resistance_0_ohm} is too high to hover on "
             f"{battery.ocv_V[-1]} V; lower it"
         )
-    computed = derived.around_hover(vehicle)
+    computed = around_hover(battery, hover_W)
     _agree(
         battery,
         computed,
@@ -189,14 +192,12 @@ def _check_supply(vehicle: Parts) -> None:
     """Hover and level flight at top speed, on the battery at dod_max."""
     battery, limits = vehicle.battery, vehicle.limits
     extra_N = vehicle.thrust_correction.speed_N_per_mps * limits.v_xy_max_mps
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    open_V = float(np.interp(battery.dod_max, battery.ocv_dod, battery.ocv_V))
     for flight, power_W in (
         ("a hover", vehicle.power.hover_W),
         ("limits.v_xy_max_mps", vehicle.power.hover_W + vehicle.power.slope_W_per_N * extra_N),
     ):
-        current_A = derived.steady_current_A(battery, battery.dod_max, power_W)
-        voltage_V = open_V - resistance_ohm * current_A
+        current_A = steady_current_A(battery, battery.dod_max, power_W)
+        voltage_V = float(steady_voltage_V(battery, battery.dod_max, current_A))
         if current_A > battery.current_max_A:
             raise ValueError(
                 f"battery.current_max_A {battery.current_max_A} does not feed {flight}, which "
@@ -212,11 +213,12 @@ def _check_supply(vehicle: Parts) -> None:
 def _linearisation_error(vehicle: Parts, battery: Battery) -> float:
     """Largest relative error of the linearised current of a hover, down to dod_cutoff."""
     start, worst = 0.0, 0.0
+    polarisation_ohm = sum(pair.resistance_ohm for pair in battery.pairs)
     for segment in segments_of(battery, vehicle.power):
         for dod in (start, min(segment.dod_end, battery.dod_cutoff)):
             if dod >= start:
-                exact_A = derived.steady_current_A(battery, dod, vehicle.power.hover_W)
-                drop_V = segment.ocv_slope_V * dod + battery.resistance_th_ohm * exact_A
+                exact_A = steady_current_A(battery, dod, vehicle.power.hover_W)
+                drop_V = segment.ocv_slope_V * dod + polarisation_ohm * exact_A
                 linear_A = segment.current_A + segment.current_A_per_V * (drop_V - segment.drop_V)
                 worst = max(worst, abs(linear_A / exact_A - 1.0))
         start = segment.dod_end

@@ -1,20 +1,13 @@
-"""What follows from the parts of a vehicle: hover power, nominal voltage, full throttle."""
+"""What follows from the parts of a vehicle: hover power, full throttle, figure of merit."""
 
 import math
-from functools import lru_cache
-from itertools import pairwise
 from types import SimpleNamespace
-from typing import Any
-
-import numpy as np
 
 from uas_coverage_env.compiled.kernels import interpreted
-from uas_coverage_env.vehicle.battery import battery_current_A
-from uas_coverage_env.vehicle.parts import Battery, Parts
+from uas_coverage_env.vehicle.parts import Parts
 from uas_coverage_env.vehicle.powertrain import electrical_power_W
 
 _SMALL = 1e-4  # of the weight, for a difference quotient
-_DOD_POINTS = 201
 
 
 def power_W(vehicle: Parts, thrust_N: float) -> float:
@@ -28,23 +21,6 @@ def hover_power(vehicle: Parts) -> dict[str, float]:
     weight_N, step_N = vehicle.weight_N, _SMALL * vehicle.weight_N
     rise_W = power_W(vehicle, weight_N + step_N) - power_W(vehicle, weight_N - step_N)
     return {"hover_W": power_W(vehicle, weight_N), "slope_W_per_N": rise_W / (2.0 * step_N)}
-
-
-def steady_current_A(battery: Battery, dod: float, power_W: float) -> float:
-    """Current of a power that has been drawn for a while, polarisation settled [A]."""
-    voltage_V = float(np.interp(dod, battery.ocv_dod, battery.ocv_V))
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    return battery_current_A(voltage_V, resistance_ohm, power_W)
-
-
-@lru_cache(maxsize=64)  # a vehicle is looked at again in every record that holds it
-def mean_voltage_V(battery: Battery, power_W: float, dod_end: float = 1.0) -> float:
-    """Mean voltage, by charge, while a power is drawn from a full battery until dod_end [V]."""
-    dod = np.linspace(0.0, dod_end, _DOD_POINTS)
-    current = np.array([steady_current_A(battery, depth, power_W) for depth in dod.tolist()])
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    voltage = np.interp(dod, battery.ocv_dod, battery.ocv_V) - resistance_ohm * current
-    return float(np.trapezoid(voltage, dod)) / dod_end
 
 
 def full_throttle_radps(vehicle: Parts, voltage_V: float) -> float:
@@ -66,17 +42,3 @@ def figure_of_merit(vehicle: Parts) -> float:
     ideal = 1.0 / math.sqrt(2.0 * rotor.air_density_kgpm3 * area_m2)
     shaft = rotor.torque_Nm_per_radps2 / rotor.thrust_N_per_radps2**1.5 / math.sqrt(n)
     return ideal / shaft
-
-
-def around_hover(vehicle: Parts) -> dict[str, Any]:
-    """Nominal voltage of the battery, and where the current is linearised for hover.
-
-    In the middle of each segment of the discharge curve, with the polarisation of a hover.
-    """
-    battery, hover_W = vehicle.battery, vehicle.power.hover_W
-    voltage_V = mean_voltage_V(battery, hover_W)
-    return {
-        "voltage_nominal_V": voltage_V,
-        "polarisation_linearised_V": battery.resistance_th_ohm * hover_W / voltage_V,
-        "ocv_dod_linearised": tuple(0.5 * (a + b) for a, b in pairwise(battery.ocv_dod)),
-    }

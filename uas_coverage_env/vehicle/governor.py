@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import linprog
 
-from uas_coverage_env.vehicle.layout import TAU_Y, THETA, VX, WY, X
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
 
@@ -57,10 +57,10 @@ def horizontal_axis(vehicle: VehicleParams, dt_s: float) -> tuple[FloatArray, Fl
     along the axis: pitch and its rate negated for north, roll and its rate for east.
     """
     A, B = taylor(*rigid_body(vehicle), dt_s, ORDER)
-    chain = [X, VX, THETA, WY]
+    chain = [S.X, S.VX, S.THETA, S.WY]
     forward = np.array([1.0, 1.0, -1.0, -1.0])
     axis_A = A[np.ix_(chain, chain)] * np.outer(forward, forward)
-    return axis_A, -B[chain, TAU_Y] * forward * vehicle.airframe.inertia_kgm2[1]
+    return axis_A, -B[chain, S.TAU_Y] * forward * vehicle.airframe.inertia_kgm2[1]
 
 
 @lru_cache(maxsize=64)

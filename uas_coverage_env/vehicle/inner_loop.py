@@ -14,27 +14,10 @@ their limits.
 
 import math
 
-from uas_coverage_env.compiled.kernels import kernel, rare_kernel
-from uas_coverage_env.vehicle.compiled import GOVERNOR_BLOCK
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import BOUND, ON_RATE, ON_REFERENCE, ON_SPEED, ON_TILT
-from uas_coverage_env.vehicle.layout import (
-    LIFT,
-    PHI,
-    POSITION,
-    PSI,
-    SPEED,
-    TAU_X,
-    TAU_Y,
-    TAU_Z,
-    THETA,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WY,
-    WZ,
-    Z,
-)
+from uas_coverage_env.vehicle.record import GOVERNOR_BLOCK
 
 COURSE_SPEED_MPS = 1.0
 """Ground speed below which a UAS that looks where it flies keeps its heading, that of ArduCopter
@@ -50,6 +33,19 @@ _INSIDE = 0.999  # of a bound: projections on the bound itself would end outside
 _HALVES = math.sqrt(0.5)  # of a norm for each of two axes
 
 
+@inlined_kernel
+def _predicted(rows, q, x, reference):
+    """What governor row q predicts along north and east, the reference held."""
+    # tilt and rate forward along north are negative pitch and pitch rate
+    n = rows[ON_SPEED, q] * x[S.VX] - rows[ON_TILT, q] * x[S.THETA]
+    n -= rows[ON_RATE, q] * x[S.WY]
+    e = rows[ON_SPEED, q] * x[S.VY] + rows[ON_TILT, q] * x[S.PHI]
+    e += rows[ON_RATE, q] * x[S.WX]
+    n += rows[ON_REFERENCE, q] * reference[0]
+    e += rows[ON_REFERENCE, q] * reference[1]
+    return n, e
+
+
 @kernel
 def reseed_reference(vehicle, x, reference):
     """Let the loop take over in a state that something else led to.
@@ -63,17 +59,13 @@ def reseed_reference(vehicle, x, reference):
         x: (14,) state.
         reference: (2,) [m/s] written.
     """
-    reference[0] = x[VX]
-    reference[1] = x[VY]
+    reference[0] = x[S.VX]
+    reference[1] = x[S.VY]
     rows = vehicle.governor_rows
     for _ in range(_SWEEPS):
         moved = False
         for q in range(vehicle.n_governor_rows):
-            # tilt and rate forward along north are negative pitch and pitch rate
-            n = rows[ON_SPEED, q] * x[VX] - rows[ON_TILT, q] * x[THETA] - rows[ON_RATE, q] * x[WY]
-            n += rows[ON_REFERENCE, q] * reference[0]
-            e = rows[ON_SPEED, q] * x[VY] + rows[ON_TILT, q] * x[PHI] + rows[ON_RATE, q] * x[WX]
-            e += rows[ON_REFERENCE, q] * reference[1]
+            n, e = _predicted(rows, q, x, reference)
             length = math.sqrt(n * n + e * e)
             if length > rows[BOUND, q] and abs(rows[ON_REFERENCE, q]) > _TINY:
                 back = (_INSIDE * rows[BOUND, q] / length - 1.0) / rows[ON_REFERENCE, q]
@@ -104,11 +96,7 @@ def _govern(vehicle, x, reference, north_mps, east_mps):
     share = 1.0
     rows = vehicle.governor_rows
     for q in range(vehicle.n_governor_rows):
-        # tilt and rate forward along north are negative pitch and pitch rate
-        n0 = rows[ON_SPEED, q] * x[VX] - rows[ON_TILT, q] * x[THETA] - rows[ON_RATE, q] * x[WY]
-        n0 += rows[ON_REFERENCE, q] * reference[0]
-        e0 = rows[ON_SPEED, q] * x[VY] + rows[ON_TILT, q] * x[PHI] + rows[ON_RATE, q] * x[WX]
-        e0 += rows[ON_REFERENCE, q] * reference[1]
+        n0, e0 = _predicted(rows, q, x, reference)
         n1 = rows[ON_REFERENCE, q] * dn
         e1 = rows[ON_REFERENCE, q] * de
         bound = rows[BOUND, q] * rows[BOUND, q]
@@ -143,7 +131,7 @@ def _keep_tilt(vehicle, x, north, east, u):
     """
     dt = vehicle.dt_s
     per = 0.5 * dt * dt
-    free_n, free_e = -x[THETA] - dt * x[WY], x[PHI] + dt * x[WX]
+    free_n, free_e = -x[S.THETA] - dt * x[S.WY], x[S.PHI] + dt * x[S.WX]
     n0, e0 = free_n + per * north, free_e + per * east
     tolerated = _TOLERATED * vehicle.tilt_max_rad
     if n0 * n0 + e0 * e0 <= tolerated * tolerated:
@@ -161,8 +149,8 @@ def _keep_tilt(vehicle, x, north, east, u):
     share = 1.0
     if b * b >= a * c:
         share = min(max((-b - math.sqrt(b * b - a * c)) / a, 0.0), 1.0)
-    u[TAU_X] = inertia[0] * (east + share * de)
-    u[TAU_Y] = -inertia[1] * (north + share * dn)
+    u[S.TAU_X] = inertia[0] * (east + share * de)
+    u[S.TAU_Y] = -inertia[1] * (north + share * dn)
 
 
 @kernel
@@ -170,14 +158,15 @@ def _track(vehicle, x, reference, u):
     """Roll and pitch torques that track the reference."""
     k = vehicle.gain
     trim = vehicle.trim_rad_per_mps
-    north = -k[ON_SPEED] * (x[VX] - reference[0]) - k[ON_TILT] * (-x[THETA] - trim * reference[0])
-    north += k[ON_RATE] * x[WY]
-    east = -k[ON_SPEED] * (x[VY] - reference[1]) - k[ON_TILT] * (x[PHI] - trim * reference[1])
-    east -= k[ON_RATE] * x[WX]
+    north = -k[ON_SPEED] * (x[S.VX] - reference[0])
+    north -= k[ON_TILT] * (-x[S.THETA] - trim * reference[0])
+    north += k[ON_RATE] * x[S.WY]
+    east = -k[ON_SPEED] * (x[S.VY] - reference[1]) - k[ON_TILT] * (x[S.PHI] - trim * reference[1])
+    east -= k[ON_RATE] * x[S.WX]
     # never active on a governed flight: it is for states that a commanded wrench led to
     share = _within_limit(north, east, vehicle.alpha_xy_max_radps2)
-    u[TAU_X] = vehicle.inertia_kgm2[0] * share * east
-    u[TAU_Y] = -vehicle.inertia_kgm2[1] * share * north
+    u[S.TAU_X] = vehicle.inertia_kgm2[0] * share * east
+    u[S.TAU_Y] = -vehicle.inertia_kgm2[1] * share * north
     if share < 1.0:
         _keep_tilt(vehicle, x, share * north, share * east, u)
 
@@ -217,10 +206,7 @@ def _far_outside(vehicle, x, reference):
     # are zero
     n_rows = (vehicle.n_governor_rows + GOVERNOR_BLOCK - 1) & _BLOCKS
     for q in range(n_rows):
-        n = rows[ON_SPEED, q] * x[VX] - rows[ON_TILT, q] * x[THETA] - rows[ON_RATE, q] * x[WY]
-        n += rows[ON_REFERENCE, q] * reference[0]
-        e = rows[ON_SPEED, q] * x[VY] + rows[ON_TILT, q] * x[PHI] + rows[ON_RATE, q] * x[WX]
-        e += rows[ON_REFERENCE, q] * reference[1]
+        n, e = _predicted(rows, q, x, reference)
         bound = _FAR_OUTSIDE * rows[BOUND, q]
         outside |= n * n + e * e > bound * bound
     return outside
@@ -244,23 +230,23 @@ def _turn_towards(vehicle, angle, rate, wanted, rate_max, alpha_max):
 @kernel
 def _level_out(vehicle, x, u):
     """Torques to a level attitude; leaning against the velocity while that is beyond its limit."""
-    speed = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY])
+    speed = math.sqrt(x[S.VX] * x[S.VX] + x[S.VY] * x[S.VY])
     lean = 0.0
     if speed > vehicle.reference_max_mps:
         lean = -0.5 * vehicle.tilt_max_rad / speed
     rate = _HALVES * vehicle.rate_max_radps
     alpha = _HALVES * vehicle.alpha_xy_max_radps2
-    roll = _turn_towards(vehicle, x[PHI], x[WX], lean * x[VY], rate, alpha)
-    pitch = _turn_towards(vehicle, x[THETA], x[WY], -lean * x[VX], rate, alpha)
-    u[TAU_X] = vehicle.inertia_kgm2[0] * roll
-    u[TAU_Y] = vehicle.inertia_kgm2[1] * pitch
+    roll = _turn_towards(vehicle, x[S.PHI], x[S.WX], lean * x[S.VY], rate, alpha)
+    pitch = _turn_towards(vehicle, x[S.THETA], x[S.WY], -lean * x[S.VX], rate, alpha)
+    u[S.TAU_X] = vehicle.inertia_kgm2[0] * roll
+    u[S.TAU_Y] = vehicle.inertia_kgm2[1] * pitch
 
 
 @kernel
 def _hold_heading(vehicle, x, u):
     """Yaw torque that brings the heading to 0, at which the model is linearised, and keeps it."""
-    u[TAU_Z] = vehicle.inertia_kgm2[2] * _turn_towards(
-        vehicle, x[PSI], x[WZ], 0.0, vehicle.yaw_rate_max_radps, vehicle.alpha_z_max_radps2
+    u[S.TAU_Z] = vehicle.inertia_kgm2[2] * _turn_towards(
+        vehicle, x[S.PSI], x[S.WZ], 0.0, vehicle.yaw_rate_max_radps, vehicle.alpha_z_max_radps2
     )
 
 
@@ -283,20 +269,20 @@ def face_course(vehicle, x, u):
         u: (5,) the yaw torque is written, whatever it was.
     """
     most = vehicle.alpha_z_max_radps2
-    if x[VX] * x[VX] + x[VY] * x[VY] < COURSE_SPEED_MPS * COURSE_SPEED_MPS:
-        alpha = min(max(-x[WZ] / vehicle.dt_s, -most), most)
+    if x[S.VX] * x[S.VX] + x[S.VY] * x[S.VY] < COURSE_SPEED_MPS * COURSE_SPEED_MPS:
+        alpha = min(max(-x[S.WZ] / vehicle.dt_s, -most), most)
     else:
-        course = x[PSI] + within_half_turn(math.atan2(x[VY], x[VX]) - x[PSI])
-        alpha = _turn_towards(vehicle, x[PSI], x[WZ], course, vehicle.yaw_rate_max_radps, most)
-    u[TAU_Z] = vehicle.inertia_kgm2[2] * alpha
+        course = x[S.PSI] + within_half_turn(math.atan2(x[S.VY], x[S.VX]) - x[S.PSI])
+        alpha = _turn_towards(vehicle, x[S.PSI], x[S.WZ], course, vehicle.yaw_rate_max_radps, most)
+    u[S.TAU_Z] = vehicle.inertia_kgm2[2] * alpha
 
 
 @kernel
 def _lift_towards(vehicle, x, down_mps, u):
     """Lift that reaches a vertical speed in one step, or as nearly as its limits allow."""
     down = min(max(down_mps, -vehicle.v_up_max_mps), vehicle.v_down_max_mps)
-    needed = (down - vehicle.vertical_A[SPEED, SPEED] * x[VZ]) / vehicle.vertical_B[SPEED]
-    u[LIFT] = min(max(needed, vehicle.lift_min_N), vehicle.lift_max_N)
+    needed = (down - vehicle.vertical_A[S.SPEED, S.SPEED] * x[S.VZ]) / vehicle.vertical_B[S.SPEED]
+    u[S.LIFT] = min(max(needed, vehicle.lift_min_N), vehicle.lift_max_N)
 
 
 @kernel
@@ -331,15 +317,15 @@ def velocity_wrench(vehicle, x, reference, north_mps, east_mps, altitude_m, u):
     is possible. Arguments as for `velocity_climb_wrench`.
     """
     A, B = vehicle.vertical_A, vehicle.vertical_B
-    per_next_speed = B[POSITION] / B[SPEED]
-    per_speed = A[POSITION, SPEED] - per_next_speed * A[SPEED, SPEED]
-    way = -altitude_m - x[Z]
+    per_next_speed = B[S.POSITION] / B[S.SPEED]
+    per_speed = A[S.POSITION, S.SPEED] - per_next_speed * A[S.SPEED, S.SPEED]
+    way = -altitude_m - x[S.Z]
     if way > 0.0:
-        brake = -vehicle.vertical_B[SPEED] * vehicle.lift_max_N
-        down = _speed_towards(way, x[VZ], per_speed, per_next_speed, brake)
+        brake = -vehicle.vertical_B[S.SPEED] * vehicle.lift_max_N
+        down = _speed_towards(way, x[S.VZ], per_speed, per_next_speed, brake)
     else:
-        brake = vehicle.vertical_B[SPEED] * vehicle.lift_min_N
-        down = -_speed_towards(-way, -x[VZ], per_speed, per_next_speed, brake)
+        brake = vehicle.vertical_B[S.SPEED] * vehicle.lift_min_N
+        down = -_speed_towards(-way, -x[S.VZ], per_speed, per_next_speed, brake)
     velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down, u)
 
 
@@ -353,6 +339,6 @@ def acceleration_wrench(vehicle, x, reference, north_mps2, east_mps2, down_mps2,
     dt = vehicle.dt_s
     north = reference[0] + dt * north_mps2
     east = reference[1] + dt * east_mps2
-    push = -vehicle.vertical_B[SPEED] * vehicle.mass_kg
-    down = vehicle.vertical_A[SPEED, SPEED] * x[VZ] + push * down_mps2
+    push = -vehicle.vertical_B[S.SPEED] * vehicle.mass_kg
+    down = vehicle.vertical_A[S.SPEED, S.SPEED] * x[S.VZ] + push * down_mps2
     velocity_climb_wrench(vehicle, x, reference, north, east, down, u)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
-from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY, VZ, WX, WY, WZ
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.params import VehicleParams
 
 
@@ -99,15 +99,15 @@ def write_limited(x, voltage_V, current_A, body_rates, values):
             the body about its own axis; not so where its tilts are on axes that do not turn.
         values: (N_LIMITS,) written.
     """
-    values[_SPEED] = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY])
-    values[_CLIMB] = -x[VZ]
-    values[_DESCENT] = x[VZ]
-    values[_TILT] = math.sqrt(x[PHI] * x[PHI] + x[THETA] * x[THETA])
-    values[_TILT_RATE] = math.sqrt(x[WX] * x[WX] + x[WY] * x[WY])
-    yaw_rate = x[WZ]
+    values[_SPEED] = math.sqrt(x[S.VX] * x[S.VX] + x[S.VY] * x[S.VY])
+    values[_CLIMB] = -x[S.VZ]
+    values[_DESCENT] = x[S.VZ]
+    values[_TILT] = math.sqrt(x[S.PHI] * x[S.PHI] + x[S.THETA] * x[S.THETA])
+    values[_TILT_RATE] = math.sqrt(x[S.WX] * x[S.WX] + x[S.WY] * x[S.WY])
+    yaw_rate = x[S.WZ]
     if body_rates:
-        yaw_rate = math.sin(x[PHI]) * x[WY] + math.cos(x[PHI]) * x[WZ]
-        yaw_rate /= math.cos(x[THETA])
+        yaw_rate = math.sin(x[S.PHI]) * x[S.WY] + math.cos(x[S.PHI]) * x[S.WZ]
+        yaw_rate /= math.cos(x[S.THETA])
     values[_YAW_RATE] = abs(yaw_rate)
     values[_CURRENT] = current_A
     values[_VOLTAGE] = voltage_V

@@ -6,32 +6,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.battery import (
     BatterySegment,
     check_step,
     check_vehicle,
+    further_settled_V,
     is_number,
     polarisation_decay,
     segment_at,
-)
-from uas_coverage_env.vehicle.layout import (
-    DELTA_THRUST,
-    DOD,
-    LIFT,
-    N_INPUTS,
-    N_STATES,
-    PHI,
-    PSI,
-    TAU_X,
-    THETA,
-    U_TH,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WZ,
-    X,
-    Z,
 )
 from uas_coverage_env.vehicle.params import VehicleParams
 
@@ -64,15 +47,15 @@ class LinearModel(NamedTuple):
 def rigid_body(vehicle: VehicleParams) -> tuple[FloatArray, FloatArray]:
     """A (14, 14) and B (14, 5) of the continuous rigid body, linearised at hover and heading 0."""
     body = vehicle.airframe
-    A, B = np.zeros((N_STATES, N_STATES)), np.zeros((N_STATES, N_INPUTS))
-    A[X : Z + 1, VX : VZ + 1] = np.eye(3)
-    A[PHI : PSI + 1, WX : WZ + 1] = np.eye(3)
-    A[VX, THETA], A[VY, PHI] = -body.gravity_mps2, body.gravity_mps2
-    A[VX, VX] = A[VY, VY] = -body.drag_kgps / body.mass_kg
-    A[VZ, VZ] = -body.drag_vertical_kgps / body.mass_kg
-    B[VZ, LIFT] = -1.0 / body.mass_kg
+    A, B = np.zeros((S.N_STATES, S.N_STATES)), np.zeros((S.N_STATES, S.N_INPUTS))
+    A[S.X : S.Z + 1, S.VX : S.VZ + 1] = np.eye(3)
+    A[S.PHI : S.PSI + 1, S.WX : S.WZ + 1] = np.eye(3)
+    A[S.VX, S.THETA], A[S.VY, S.PHI] = -body.gravity_mps2, body.gravity_mps2
+    A[S.VX, S.VX] = A[S.VY, S.VY] = -body.drag_kgps / body.mass_kg
+    A[S.VZ, S.VZ] = -body.drag_vertical_kgps / body.mass_kg
+    B[S.VZ, S.LIFT] = -1.0 / body.mass_kg
     for axis in range(3):
-        B[WX + axis, TAU_X + axis] = 1.0 / body.inertia_kgm2[axis]
+        B[S.WX + axis, S.TAU_X + axis] = 1.0 / body.inertia_kgm2[axis]
     return A, B
 
 
@@ -129,37 +112,39 @@ def _on_segment(
     """The model on one straight piece of the discharge curve."""
     battery = vehicle.battery
     A, B = taylor(*rigid_body(vehicle), dt_s, order)
-    if max(abs(A[VX, VX]), abs(A[VZ, VZ])) > 1.0:
+    if max(abs(A[S.VX, S.VX]), abs(A[S.VZ, S.VZ])) > 1.0:
         raise ValueError(
             f"dt_s is {dt_s}; the series of order {order} of the drag diverges, give a shorter step"
         )
-    current_x, current_u = np.zeros(N_STATES), np.zeros(N_INPUTS)
-    current_x[DOD] = segment.current_A_per_V * segment.ocv_slope_V
-    current_x[U_TH] = segment.current_A_per_V
-    current_u[DELTA_THRUST] = segment.current_A_per_N
-    current_0 = segment.current_A - segment.current_A_per_V * segment.drop_V
+    current_x, current_u = np.zeros(S.N_STATES), np.zeros(S.N_INPUTS)
+    current_x[S.DOD] = segment.current_A_per_V * segment.ocv_slope_V
+    current_x[S.U_TH] = segment.current_A_per_V
+    current_u[S.DELTA_THRUST] = segment.current_A_per_N
+    # a linear model has the paper's RC pair; further ones have settled in a hover
+    further_V = sum(further_settled_V(vehicle))
+    current_0 = segment.current_A - segment.current_A_per_V * (segment.drop_V - further_V)
     decay = polarisation_decay(vehicle, dt_s, order)
-    E = np.zeros(N_STATES)
-    A[U_TH, U_TH] = decay
+    E = np.zeros(S.N_STATES)
+    A[S.U_TH, S.U_TH] = decay
     for row, per_ampere in (
-        (DOD, dt_s / (3600.0 * battery.capacity_Ah)),
-        (U_TH, (1.0 - decay) * battery.resistance_th_ohm),
+        (S.DOD, dt_s / (3600.0 * battery.capacity_Ah)),
+        (S.U_TH, (1.0 - decay) * battery.resistance_th_ohm),
     ):
         A[row] += per_ampere * current_x
         B[row] += per_ampere * current_u
         E[row] = per_ampere * current_0
     R0 = battery.resistance_0_ohm
-    soc_x, voltage_x = np.zeros(N_STATES), -R0 * current_x
-    soc_x[DOD] = -1.0
-    voltage_x[DOD] -= segment.ocv_slope_V
-    voltage_x[U_TH] -= 1.0
+    soc_x, voltage_x = np.zeros(S.N_STATES), -R0 * current_x
+    soc_x[S.DOD] = -1.0
+    voltage_x[S.DOD] -= segment.ocv_slope_V
+    voltage_x[S.U_TH] -= 1.0
     model = LinearModel(
         A,
         B,
         E,
         np.stack([soc_x, voltage_x, current_x]),
-        np.stack([np.zeros(N_INPUTS), -R0 * current_u, current_u]),
-        np.array([1.0, segment.ocv_V - R0 * current_0, current_0]),
+        np.stack([np.zeros(S.N_INPUTS), -R0 * current_u, current_u]),
+        np.array([1.0, segment.ocv_V - further_V - R0 * current_0, current_0]),
     )
     for matrix in model:
         matrix.setflags(write=False)

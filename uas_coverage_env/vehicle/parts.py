@@ -5,9 +5,15 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from uas_coverage_env.files.strict_toml import StrictModel
+
+MAX_SEGMENTS = 8
+"""Straight pieces of a discharge curve."""
+
+MAX_FURTHER_PAIRS = 3
+"""RC pairs of a battery beside the paper's."""
 
 ABSENT = math.nan
 """Stands for a value that a file leaves out and `VehicleParams` computes."""
@@ -39,7 +45,7 @@ def _computed(low: float, high: float) -> Any:
 def computed_fields(section: type[StrictModel]) -> tuple[str, ...]:
     """The fields of a section that a file may leave out, because they follow from the parts."""
     fields = section.model_fields.items()
-    return tuple(name for name, field in fields if is_absent(field.default))
+    return tuple(name for name, field in fields if field.validate_default is False)
 
 
 def is_absent(value: object) -> bool:
@@ -47,7 +53,36 @@ def is_absent(value: object) -> bool:
     return value == () or (isinstance(value, float) and math.isnan(value))
 
 
-class Airframe(StrictModel):
+class RecordedPart(StrictModel):
+    """A part whose numbers the kernels read, each under its name in `_IN_RECORD` or its own."""
+
+    @classmethod
+    def record_fields(cls) -> list[tuple[str, str]]:
+        """Names and types in the record of a vehicle."""
+        kinds = {float: "f8", int: "i8"}
+        return [
+            (_IN_RECORD.get(name, name), kinds[field.annotation])
+            for name, field in cls.model_fields.items()
+            if field.annotation in kinds
+        ]
+
+    def in_record(self) -> dict[str, float]:
+        """Values by their names in the record of a vehicle."""
+        numbers = ((name, value) for name, value in self if isinstance(value, float | int))
+        return {_IN_RECORD.get(name, name): value for name, value in numbers}
+
+
+_IN_RECORD = {
+    "speed_max_radps": "motor_speed_max_radps",
+    "resistance_ohm": "motor_resistance_ohm",
+    "constant_loss_W": "esc_loss_W",
+    "efficiency": "esc_efficiency",
+    "angular_acceleration_xy_max_radps2": "alpha_xy_max_radps2",
+    "angular_acceleration_z_max_radps2": "alpha_z_max_radps2",
+}
+
+
+class Airframe(RecordedPart):
     """Rigid body and rotor arrangement (the paper's Assumption 1: rotors equally spaced).
 
     Neighbouring rotors turn against each other. Three rotors cannot balance their yaw torque that
@@ -64,7 +99,7 @@ class Airframe(StrictModel):
     drag_vertical_kgps: Slope
 
 
-class Rotor(StrictModel):
+class Rotor(RecordedPart):
     """One rotor with its propeller; full throttle is computed where it is left out."""
 
     thrust_N_per_radps2: Annotated[float, _within(1e-12, 1.0)]
@@ -76,7 +111,7 @@ class Rotor(StrictModel):
     speed_max_radps: Annotated[float, _computed(1.0, 100_000.0)] = ABSENT
 
 
-class Motor(StrictModel):
+class Motor(RecordedPart):
     """One brushless motor, its speed controller's resistance included."""
 
     back_emf_Vs_per_rad: Annotated[float, _within(1e-6, 10.0)]
@@ -84,7 +119,7 @@ class Motor(StrictModel):
     no_load_current_A: Annotated[float, _within(0.0, 1000.0)]
 
 
-class Esc(StrictModel):
+class Esc(RecordedPart):
     """One electronic speed controller."""
 
     constant_loss_W: Annotated[float, _within(0.0, 1e5)]
@@ -103,10 +138,18 @@ def _hash(record: StrictModel) -> int:
     return hash(tuple(record.__dict__[name] for name in type(record).model_fields))
 
 
+class RcPair(StrictModel):
+    """A resistance and a capacity side by side, in series with the others."""
+
+    resistance_ohm: Resistance_ohm
+    time_constant_s: Annotated[float, _within(0.01, 1e5)]
+
+
 class Battery(StrictModel):
     """Thevenin battery with a piecewise-linear discharge curve.
 
-    Nominal voltage and linearisation points are computed where they are left out.
+    Nominal voltage and linearisation points are computed where they are left out. `rc` are further
+    RC pairs, beside the paper's.
     """
 
     capacity_Ah: Annotated[float, _within(1e-3, 10_000.0)]
@@ -116,12 +159,21 @@ class Battery(StrictModel):
     polarisation_linearised_V: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
     ocv_dod: tuple[DodPoint, ...]
     ocv_V: tuple[Voltage_V, ...]
-    ocv_dod_linearised: tuple[DodPoint, ...] = ()
+    ocv_dod_linearised: Annotated[tuple[DodPoint, ...], Field(validate_default=False)] = ()
     voltage_nominal_V: Annotated[float, _computed(0.1, 10_000.0)] = ABSENT
     voltage_min_V: Voltage_V
     current_max_A: Current_A
     dod_max: Fraction
     dod_cutoff: Fraction
+    rc: Annotated[tuple[RcPair, ...], Field(max_length=MAX_FURTHER_PAIRS)] = ()
+
+    # a battery without further pairs is written as it always was
+    @model_serializer(mode="wrap")
+    def _without_empty(self, as_usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        data: dict[str, Any] = as_usual(self)
+        if not self.rc:
+            data.pop("rc", None)
+        return data
 
     # results are cached by it
     def __hash__(self) -> int:
@@ -132,8 +184,11 @@ class Battery(StrictModel):
         dod, volt = self.ocv_dod, self.ocv_V
         if len(dod) != len(volt) or len(dod) < 2:
             raise ValueError("ocv_dod and ocv_V need the same number of points, two at least")
-        if len(dod) > 9:
-            raise ValueError(f"ocv_dod has {len(dod)} points; give at most 9 (8 segments)")
+        if len(dod) > MAX_SEGMENTS + 1:
+            raise ValueError(
+                f"ocv_dod has {len(dod)} points; "
+                f"give at most {MAX_SEGMENTS + 1} ({MAX_SEGMENTS} segments)"
+            )
         if dod[0] != 0.0 or dod[-1] != 1.0:
             raise ValueError(f"ocv_dod runs from {dod[0]} to {dod[-1]}; it must run from 0 to 1")
         if any(b <= a for a, b in pairwise(dod)):
@@ -157,6 +212,21 @@ class Battery(StrictModel):
         return self
 
     @property
+    def pairs(self) -> tuple[RcPair, ...]:
+        """All RC pairs, the paper's first."""
+        return (
+            RcPair.model_construct(
+                resistance_ohm=self.resistance_th_ohm, time_constant_s=self.time_constant_th_s
+            ),
+            *self.rc,
+        )
+
+    @property
+    def resistance_ohm(self) -> float:
+        """Of a current that has flowed for a while: R_0 and those of all RC pairs."""
+        return sum((pair.resistance_ohm for pair in self.pairs), self.resistance_0_ohm)
+
+    @property
     def voltages_linearised_V(self) -> tuple[float, ...]:
         """Voltage behind R_0 at which the current is linearised, for each piece of the curve [V].
 
@@ -173,7 +243,7 @@ class Battery(StrictModel):
         )
 
 
-class Limits(StrictModel):
+class Limits(RecordedPart):
     """Bounds of states and inputs (the paper's sets X and U)."""
 
     v_xy_max_mps: Speed_mps
@@ -201,7 +271,7 @@ class Limits(StrictModel):
         return self
 
 
-class ThrustCorrection(StrictModel):
+class ThrustCorrection(RecordedPart):
     """Slopes of the piecewise-linear thrust correction f_T, see `thrust_correction`.
 
     Those that are left out are fitted to the exact form.
@@ -254,23 +324,9 @@ class Parts(StrictModel):
 
     def kernel_scalars(self) -> dict[str, float]:
         """Body, rotors, motors and speed controllers under the names that the kernels read."""
-        renamed = {
-            "speed_max_radps": "motor_speed_max_radps",
-            "resistance_ohm": "motor_resistance_ohm",
-            "constant_loss_W": "esc_loss_W",
-            "efficiency": "esc_efficiency",
-        }
-        left_out = {"first_arm_angle_rad", "inertia_kgm2"}
-        return {
-            "weight_N": self.weight_N,
-            "auxiliary_W": self.power.auxiliary_W,
-            **{
-                renamed.get(name, name): value
-                for section in (self.airframe, self.rotor, self.motor, self.esc)
-                for name, value in section
-                if name not in left_out
-            },
-        }
+        sections = (self.airframe, self.rotor, self.motor, self.esc)
+        values = {"weight_N": self.weight_N, "auxiliary_W": self.power.auxiliary_W}
+        return values | {k: v for section in sections for k, v in section.in_record().items()}
 
     @cached_property
     def torque_max_Nm(self) -> tuple[float, float, float]:

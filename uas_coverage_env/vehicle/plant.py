@@ -6,40 +6,22 @@ state, theta_lin(t). There, tilt is horizontal acceleration over g, which is the
 real one under a thrust whose vertical part is weight plus lift: the loop follows
 theta = atan(theta_lin(t)), and the velocities of the step come out as predicted.
 
-A UAS that looks where it flies has its tilts and their rates on axes that do not turn (`layout`):
-body to NED is pitch, then roll, then the turn about the body's own axis. Thrust, drag and power do
-not depend on the turn; torques, inertia and motors are those of the body.
+A UAS that looks where it flies has its tilts on axes that do not turn (`layout`). It is flown as
+if it faced north: its heading goes beside, as the LPV model has it, and nothing depends on it.
 
-Left out: motor lag (30 ms against steps of a second), the gyroscopic torque of the rotors, and the
-loss of motor speed with a falling battery voltage.
+Left out: motor lag (30 ms against steps of a second), the gyroscopic torque of the rotors, the
+loss of motor speed with a falling battery voltage, what a turn to the course does to the tilts.
 """
 
 import math
 
 from uas_coverage_env.compiled.kernels import kernel, rarely, stack_array
-from uas_coverage_env.vehicle.compiled import MAX_MOTORS, OF_PITCH, OF_ROLL, OF_THRUST, OF_YAW
-from uas_coverage_env.vehicle.layout import (
-    DELTA_THRUST,
-    DOD,
-    LIFT,
-    N_INPUTS,
-    N_STATES,
-    PHI,
-    PSI,
-    TAU_X,
-    TAU_Y,
-    TAU_Z,
-    THETA,
-    U_TH,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WY,
-    WZ,
-    X,
-)
-from uas_coverage_env.vehicle.powertrain import battery_operating_point, electrical_power_W
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.discharge import discharge, discharge_further, operating_point
+from uas_coverage_env.vehicle.lpv import turn
+from uas_coverage_env.vehicle.parts import MAX_FURTHER_PAIRS
+from uas_coverage_env.vehicle.powertrain import electrical_power_W
+from uas_coverage_env.vehicle.record import MAX_MOTORS, OF_PITCH, OF_ROLL, OF_THRUST, OF_YAW
 from uas_coverage_env.vehicle.thrust_correction import static_thrust
 
 _SUBSTEP_S = 0.02
@@ -53,7 +35,7 @@ _RATE_ASKED_RADPS = 3.0
 _TILT_STOP_RAD = 1.3
 _RATE_STOP_RADPS = 50.0
 _UPRIGHT_MIN = 0.3
-_RIGID = DOD
+_RIGID = S.DOD
 _ROLL, _PITCH, _YAW, _ROLL_RATE, _PITCH_RATE, _YAW_RATE = range(6)
 
 
@@ -94,68 +76,39 @@ def mix(vehicle, thrust_N, torque, motor_thrust_N):
 @kernel
 def _euler_rates(x, rates):
     """Psi' = W(phi, theta) omega, into rates (3,)."""
-    sp = math.sin(x[PHI])
-    cp = math.cos(x[PHI])
-    around = (sp * x[WY] + cp * x[WZ]) / math.cos(x[THETA])
-    rates[0] = x[WX] + around * math.sin(x[THETA])
-    rates[1] = cp * x[WY] - sp * x[WZ]
+    sp = math.sin(x[S.PHI])
+    cp = math.cos(x[S.PHI])
+    around = (sp * x[S.WY] + cp * x[S.WZ]) / math.cos(x[S.THETA])
+    rates[0] = x[S.WX] + around * math.sin(x[S.THETA])
+    rates[1] = cp * x[S.WY] - sp * x[S.WZ]
     rates[2] = around
-
-
-@kernel
-def _attitude_rates(vehicle, x, rates):
-    """Rates of PHI, THETA and PSI, into rates (3,)."""
-    if rarely(vehicle.follows_course):
-        rates[0] = x[WX]
-        rates[1] = x[WY] / math.cos(x[PHI])
-        rates[2] = _turn_rate(x)
-    else:
-        _euler_rates(x, rates)
-
-
-@kernel
-def _turn_rate(x):
-    """Rate of PSI on axes that do not turn: the body rate less what tilting them takes."""
-    return x[WZ] + math.tan(x[PHI]) * x[WY]
 
 
 @kernel
 def _rigid_body(vehicle, x, thrust_N, torque, dx):
     """The twelve derivatives of the rigid body with thrust and torque held."""
-    sp = math.sin(x[PHI])
-    cp = math.cos(x[PHI])
-    st = math.sin(x[THETA])
-    ct = math.cos(x[THETA])
-    turns = vehicle.follows_course
-    psi = 0.0 if turns else x[PSI]
-    ss = math.sin(psi)
-    cs = math.cos(psi)
+    sp = math.sin(x[S.PHI])
+    cp = math.cos(x[S.PHI])
+    st = math.sin(x[S.THETA])
+    ct = math.cos(x[S.THETA])
+    ss = math.sin(x[S.PSI])
+    cs = math.cos(x[S.PSI])
     mass = vehicle.mass_kg
     push = thrust_N / mass
     drag = vehicle.drag_kgps / mass
     for axis in range(3):
-        dx[X + axis] = x[VX + axis]
-    dx[VX] = -push * (cp * st * cs + sp * ss) - drag * x[VX]
-    dx[VY] = -push * (cp * st * ss - sp * cs) - drag * x[VY]
-    dx[VZ] = vehicle.gravity_mps2 - push * cp * ct
-    dx[VZ] -= vehicle.drag_vertical_kgps / mass * x[VZ]
-    _attitude_rates(vehicle, x, dx[PHI:WX])
-    p = x[WX]
-    q = x[WY]
-    if rarely(turns):
-        ss = math.sin(x[PSI])
-        cs = math.cos(x[PSI])
-        p = cs * x[WX] + ss * x[WY]
-        q = cs * x[WY] - ss * x[WX]
+        dx[S.X + axis] = x[S.VX + axis]
+    dx[S.VX] = -push * (cp * st * cs + sp * ss) - drag * x[S.VX]
+    dx[S.VY] = -push * (cp * st * ss - sp * cs) - drag * x[S.VY]
+    dx[S.VZ] = vehicle.gravity_mps2 - push * cp * ct
+    dx[S.VZ] -= vehicle.drag_vertical_kgps / mass * x[S.VZ]
+    _euler_rates(x, dx[S.PHI : S.WX])
+    p = x[S.WX]
+    q = x[S.WY]
     inertia = vehicle.inertia_kgm2
-    dp = (torque[0] - (inertia[2] - inertia[1]) * q * x[WZ]) / inertia[0]
-    dq = (torque[1] - (inertia[0] - inertia[2]) * x[WZ] * p) / inertia[1]
-    dx[WX] = dp
-    dx[WY] = dq
-    dx[WZ] = (torque[2] - (inertia[1] - inertia[0]) * p * q) / inertia[2]
-    if rarely(turns):
-        dx[WX] = cs * dp - ss * dq - dx[PSI] * x[WY]
-        dx[WY] = ss * dp + cs * dq + dx[PSI] * x[WX]
+    dx[S.WX] = (torque[0] - (inertia[2] - inertia[1]) * q * x[S.WZ]) / inertia[0]
+    dx[S.WY] = (torque[1] - (inertia[0] - inertia[2]) * x[S.WZ] * p) / inertia[1]
+    dx[S.WZ] = (torque[2] - (inertia[1] - inertia[0]) * p * q) / inertia[2]
 
 
 @kernel
@@ -188,9 +141,9 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
         torque: (3,) [N m] written.
     """
     inertia = vehicle.inertia_kgm2
-    alpha_roll = u[TAU_X] / inertia[0]
-    alpha_pitch = u[TAU_Y] / inertia[1]
-    alpha_yaw = u[TAU_Z] / inertia[2]
+    alpha_roll = u[S.TAU_X] / inertia[0]
+    alpha_pitch = u[S.TAU_Y] / inertia[1]
+    alpha_yaw = u[S.TAU_Z] / inertia[2]
     half = 0.5 * time_s
     rate = first[_PITCH_RATE] + alpha_pitch * time_s
     _asked(first[_PITCH] + (first[_PITCH_RATE] + rate) * half, rate, alpha_pitch, pitch)
@@ -203,60 +156,23 @@ def _attitude_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
     yaw_rate = first[_YAW_RATE] + alpha_yaw * time_s
     yaw = first[_YAW] + (first[_YAW_RATE] + yaw_rate) * half
     # Euler rates wanted, then body rates by the inverse of W
-    phi_rate = roll[1] + _ANGLE_GAIN_PER_S * (roll[0] - x[PHI])
-    theta_rate = pitch[1] + _ANGLE_GAIN_PER_S * (pitch[0] - x[THETA])
-    psi_rate = yaw_rate + _ANGLE_GAIN_PER_S * (yaw - x[PSI])
+    phi_rate = roll[1] + _ANGLE_GAIN_PER_S * (roll[0] - x[S.PHI])
+    theta_rate = pitch[1] + _ANGLE_GAIN_PER_S * (pitch[0] - x[S.THETA])
+    psi_rate = yaw_rate + _ANGLE_GAIN_PER_S * (yaw - x[S.PSI])
     psi_rate = min(max(psi_rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
-    sp = math.sin(x[PHI])
-    cp = math.cos(x[PHI])
-    st = math.sin(x[THETA])
-    ct = math.cos(x[THETA])
+    sp = math.sin(x[S.PHI])
+    cp = math.cos(x[S.PHI])
+    st = math.sin(x[S.THETA])
+    ct = math.cos(x[S.THETA])
     p = phi_rate - st * psi_rate
     q = cp * theta_rate + sp * ct * psi_rate
     r = cp * ct * psi_rate - sp * theta_rate
     ahead_p = roll[2] - st * alpha_yaw
     ahead_q = cp * pitch[2] + sp * ct * alpha_yaw
     ahead_r = cp * ct * alpha_yaw - sp * pitch[2]
-    torque[0] = inertia[0] * (ahead_p + _RATE_GAIN_PER_S * (p - x[WX]))
-    torque[1] = inertia[1] * (ahead_q + _RATE_GAIN_PER_S * (q - x[WY]))
-    torque[2] = inertia[2] * (ahead_r + _RATE_GAIN_PER_S * (r - x[WZ]))
-
-
-@kernel
-def _turning_loop(vehicle, x, first, u, time_s, roll, pitch, torque):
-    """`_attitude_loop` of a UAS that turns: tilts as if it did not, and its heading beside them.
-
-    Arguments as there; the torque is that of the body.
-    """
-    level = stack_array(N_STATES)
-    facing = stack_array(6)
-    tilting = stack_array(N_INPUTS)
-    for s in range(PHI, DOD):
-        level[s] = x[s]
-        facing[s - PHI] = first[s - PHI]
-    for k in range(N_INPUTS):
-        tilting[k] = u[k]
-    level[PSI] = 0.0
-    facing[_YAW] = 0.0
-    facing[_YAW_RATE] = 0.0
-    tilting[TAU_Z] = 0.0
-    _attitude_loop(vehicle, level, facing, tilting, time_s, roll, pitch, torque)
-    inertia = vehicle.inertia_kgm2
-    alpha = u[TAU_Z] / inertia[2]
-    turn_rate = _turn_rate(x)
-    rate = first[_YAW_RATE] + alpha * time_s
-    heading = first[_YAW] + 0.5 * (first[_YAW_RATE] + rate) * time_s
-    rate += _ANGLE_GAIN_PER_S * (heading - x[PSI])
-    rate = min(max(rate, -vehicle.yaw_rate_max_radps), vehicle.yaw_rate_max_radps)
-    torque[2] = inertia[2] * (alpha + _RATE_GAIN_PER_S * (rate - turn_rate))
-    cs = math.cos(x[PSI])
-    ss = math.sin(x[PSI])
-    p = cs * x[WX] + ss * x[WY]
-    q = cs * x[WY] - ss * x[WX]
-    about_x = torque[0] / inertia[0]
-    about_y = torque[1] / inertia[1]
-    torque[0] = inertia[0] * (cs * about_x + ss * about_y + turn_rate * q)
-    torque[1] = inertia[1] * (cs * about_y - ss * about_x - turn_rate * p)
+    torque[0] = inertia[0] * (ahead_p + _RATE_GAIN_PER_S * (p - x[S.WX]))
+    torque[1] = inertia[1] * (ahead_q + _RATE_GAIN_PER_S * (q - x[S.WY]))
+    torque[2] = inertia[2] * (ahead_r + _RATE_GAIN_PER_S * (r - x[S.WZ]))
 
 
 @kernel
@@ -275,9 +191,9 @@ def _integrate(vehicle, x, h, thrust_N, torque, k, total, middle):
     for s in range(_RIGID):
         x[s] += h / 6.0 * total[s]
     for axis in range(3):
-        x[WX + axis] = min(max(x[WX + axis], -_RATE_STOP_RADPS), _RATE_STOP_RADPS)
+        x[S.WX + axis] = min(max(x[S.WX + axis], -_RATE_STOP_RADPS), _RATE_STOP_RADPS)
     for axis in range(2):
-        x[PHI + axis] = min(max(x[PHI + axis], -_TILT_STOP_RAD), _TILT_STOP_RAD)
+        x[S.PHI + axis] = min(max(x[S.PHI + axis], -_TILT_STOP_RAD), _TILT_STOP_RAD)
 
 
 @kernel
@@ -305,48 +221,49 @@ def plant_step(vehicle, x, u, x_next):
     total = stack_array(_RIGID)
     middle = stack_array(_RIGID)
     motors = stack_array(MAX_MOTORS)
+    further_V = stack_array(MAX_FURTHER_PAIRS)
+    for p in range(vehicle.n_further):
+        further_V[p] = vehicle.further_V[p]
     for s in range(x.shape[0]):
         x_next[s] = x[s]
+    psi, yaw_rate, yaw_torque = x[S.PSI], x[S.WZ], u[S.TAU_Z]
+    if rarely(vehicle.follows_course):
+        x_next[S.PSI] = u[S.TAU_Z] = 0.0
+        # the body's own rate, at which its tilts do not turn it
+        x_next[S.WZ] = -math.tan(x_next[S.PHI]) * x_next[S.WY]
     for s in range(6):
-        first[s] = x_next[PHI + s]
+        first[s] = x_next[S.PHI + s]
     # the LPV model reads body rates as rates of the angles; of a body that spins, the part of the
     # spin in them changes no tilt and would be taken for more and more of it
-    turns = vehicle.follows_course
     _euler_rates(x_next, roll)
-    if rarely(turns):
-        roll[2] = 0.0
-        # the body's own rate, until the end of the step
-        x_next[WZ] -= math.tan(x_next[PHI]) * x_next[WY]
-    first[_ROLL_RATE] += math.sin(x_next[THETA]) * roll[2]
-    first[_PITCH_RATE] -= math.sin(x_next[PHI]) * math.cos(x_next[THETA]) * roll[2]
+    first[_ROLL_RATE] += math.sin(x_next[S.THETA]) * roll[2]
+    first[_PITCH_RATE] -= math.sin(x_next[S.PHI]) * math.cos(x_next[S.THETA]) * roll[2]
     correction = 0.0
     charge = 0.0
     energy = 0.0
     for step in range(steps):
-        if rarely(turns):
-            _turning_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
-        else:
-            _attitude_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
+        _attitude_loop(vehicle, x_next, first, u, step * h, roll, pitch, torque)
         # upright in the middle of the substep
-        _attitude_rates(vehicle, x_next, roll)
-        upright = math.cos(x_next[PHI] + 0.5 * h * roll[0])
-        upright *= math.cos(x_next[THETA] + 0.5 * h * roll[1])
-        thrust = (vehicle.weight_N + u[LIFT]) / max(upright, _UPRIGHT_MIN)
+        _euler_rates(x_next, roll)
+        upright = math.cos(x_next[S.PHI] + 0.5 * h * roll[0])
+        upright *= math.cos(x_next[S.THETA] + 0.5 * h * roll[1])
+        thrust = (vehicle.weight_N + u[S.LIFT]) / max(upright, _UPRIGHT_MIN)
         thrust = mix(vehicle, thrust, torque, motors)
         static = static_thrust(
             vehicle,
             thrust,
-            x_next[PHI],
-            x_next[THETA],
-            0.0 if turns else x_next[PSI],
-            x_next[VX],
-            x_next[VY],
-            x_next[VZ],
+            x_next[S.PHI],
+            x_next[S.THETA],
+            x_next[S.PSI],
+            x_next[S.VX],
+            x_next[S.VY],
+            x_next[S.VZ],
         )
         power = vehicle.power_factor * electrical_power_W(vehicle, static)
-        voltage, current = battery_operating_point(vehicle, x_next[DOD], x_next[U_TH], power)
-        x_next[DOD] += current * h / vehicle.capacity_As
-        x_next[U_TH] = left * x_next[U_TH] + (1.0 - left) * vehicle.resistance_th_ohm * current
+        voltage, current = operating_point(vehicle, further_V, x_next, power)
+        discharge(vehicle, x_next, current, h, left)
+        if rarely(vehicle.n_further > 0):
+            discharge_further(vehicle, further_V, current, h)
         correction += static - vehicle.weight_N
         charge += current * h
         energy += voltage * current * h
@@ -354,7 +271,9 @@ def plant_step(vehicle, x, u, x_next):
             torque[axis] *= vehicle.thrust_factor
         thrust *= vehicle.thrust_factor
         _integrate(vehicle, x_next, h, thrust, torque, slope, total, middle)
-    if rarely(turns):
-        x_next[WZ] = _turn_rate(x_next)
-    u[DELTA_THRUST] = correction / steps
+    if rarely(vehicle.follows_course):
+        u[S.TAU_Z] = yaw_torque
+        x_next[S.PSI], x_next[S.WZ] = psi, yaw_rate
+        turn(vehicle, x_next, u)
+    u[S.DELTA_THRUST] = correction / steps
     return energy / charge, charge / vehicle.dt_s

@@ -3,10 +3,6 @@
 import math
 
 from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.vehicle.battery import battery_current_A
-from uas_coverage_env.vehicle.lpv import open_circuit_V
-
-_current = kernel(battery_current_A)
 
 
 @kernel
@@ -23,15 +19,3 @@ def electrical_power_W(vehicle, thrust_N):
     voltage = vehicle.motor_resistance_ohm * current + vehicle.back_emf_Vs_per_rad * speed
     per_motor = voltage * current / vehicle.esc_efficiency + vehicle.esc_loss_W
     return n * per_motor + vehicle.auxiliary_W
-
-
-@kernel
-def battery_operating_point(vehicle, dod, u_th_V, power_W):
-    """Voltage and current at which the Thevenin battery delivers a power.
-
-    u_b i = P with u_b = OCV - u_th - R_0 i; where the battery has less power than is asked for, the
-    product of the two is what it has.
-    """
-    E = open_circuit_V(vehicle, dod) - u_th_V
-    current = _current(E, vehicle.resistance_0_ohm, power_W)
-    return E - vehicle.resistance_0_ohm * current, current

@@ -11,8 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.vehicle.battery import battery_current_A
-from uas_coverage_env.vehicle.derived import steady_current_A
+from uas_coverage_env.vehicle.battery import (
+    battery_current_A,
+    open_circuit_voltage,
+    steady_current_A,
+)
 from uas_coverage_env.vehicle.params import VehicleParams
 
 
@@ -178,7 +181,6 @@ def seconds_until(vehicle: VehicleParams, dod: float, dod_end: float, power_W: f
     """
     battery = vehicle.battery
     depths = np.linspace(dod, dod_end, 33)
-    voltage_V = float(np.interp(depths, battery.ocv_dod, battery.ocv_V).mean())
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
-    current_A = battery_current_A(voltage_V, resistance_ohm, power_W)
+    voltage_V = float(open_circuit_voltage(vehicle, depths).mean())
+    current_A = battery_current_A(voltage_V, battery.resistance_ohm, power_W)
     return (dod_end - dod) * battery.capacity_Ah * 3600.0 / current_A

@@ -12,8 +12,7 @@ from typing import NamedTuple
 from scipy.optimize import brentq
 
 from uas_coverage_env.files.strict_toml import InputError, parse
-from uas_coverage_env.vehicle import derived
-from uas_coverage_env.vehicle.compiled import compile_vehicle
+from uas_coverage_env.vehicle.battery import mean_voltage_V, steady_current_A
 from uas_coverage_env.vehicle.data_sheet import (
     DataSheet,
     Sections,
@@ -23,9 +22,10 @@ from uas_coverage_env.vehicle.data_sheet import (
     file_text,
     given,
 )
-from uas_coverage_env.vehicle.endurance import flight_time_s, linearised_hover_time_s
+from uas_coverage_env.vehicle.flight_time import flight_time_s, linearised_hover_time_s
 from uas_coverage_env.vehicle.params import VehicleParams
 from uas_coverage_env.vehicle.parts import Battery
+from uas_coverage_env.vehicle.record import compile_vehicle
 
 HOVER_TOLERANCE = 0.03
 """So far may the hover time of a made vehicle be from the one asked for, in either dynamics."""
@@ -125,19 +125,19 @@ def _battery(sheet: DataSheet) -> Battery:
 def _hover_W(sheet: DataSheet, battery: Battery) -> float:
     """The power that takes the battery down to `charge_left` in `hover_minutes`."""
     dod_end, time_h = 1.0 - sheet.charge_left, sheet.hover_minutes / 60.0
-    resistance_ohm = battery.resistance_0_ohm + battery.resistance_th_ohm
 
     def too_little_W(power_W: float) -> float:
-        voltage_V = derived.mean_voltage_V(battery, power_W, dod_end)
+        voltage_V = mean_voltage_V(battery, power_W, dod_end)
         return sheet.capacity_Ah * dod_end * voltage_V / time_h - power_W
 
     # an empty battery still has to deliver it
-    most_W = battery.ocv_V[-1] ** 2 / (4.0 * resistance_ohm)
+    most_W = battery.ocv_V[-1] ** 2 / (4.0 * battery.resistance_ohm)
     if too_little_W(most_W) >= 0.0:
         raise InputError(
             f"hover_minutes {sheet.hover_minutes:g} empties {sheet.capacity_Ah:g} Ah of "
-            f"{sheet.cells} cells faster than their resistance of {1e3 * resistance_ohm:.3g} mohm "
-            "lets it; correct hover_minutes, capacity_Ah or cells, or give resistance_mohm"
+            f"{sheet.cells} cells faster than their resistance of "
+            f"{1e3 * battery.resistance_ohm:.3g} mohm lets it; correct hover_minutes, capacity_Ah "
+            "or cells, or give resistance_mohm"
         )
     return float(brentq(too_little_W, 0.0, most_W))  # pyrefly: ignore[bad-argument-type]
 
@@ -203,7 +203,7 @@ def _drive(sheet: DataSheet, battery: Battery, hover_W: float) -> dict[str, dict
     copper_W = _COPPER_SHARE * loss_W
     # full throttle at the nominal voltage: U = K_e Ω_max + R i_max, the current growing with Ω²
     ratio = _thrust_to_weight(sheet)
-    voltage_V = derived.mean_voltage_V(battery, hover_W)
+    voltage_V = mean_voltage_V(battery, hover_W)
     current_A = (shaft_W * math.sqrt(ratio) + copper_W * ratio) / n / voltage_V
     known = "given" if sheet.thrust_to_weight else "assumed"
     return {
@@ -252,14 +252,14 @@ def _minutes(sheet: DataSheet, battery: Battery, shaft_W: float, efficiency: flo
     share = _AUXILIARY_SHARE if sheet.auxiliary_W is None else 0.0
     power_W = (shaft_W / efficiency + auxiliary_W) / (1.0 - share)
     dod_end = 1.0 - sheet.charge_left
-    voltage_V = derived.mean_voltage_V(battery, power_W, dod_end)
+    voltage_V = mean_voltage_V(battery, power_W, dod_end)
     return 60.0 * sheet.capacity_Ah * dod_end * voltage_V / power_W
 
 
 def _battery_section(sheet: DataSheet, battery: Battery, hover_W: float) -> dict[str, Value]:
     # shaft power goes with T^1.5; losses, most of them constant, grow less
     most_W = hover_W * (1.0 + _delta_thrust_share(sheet)) ** 1.5
-    current_A = 1.05 * derived.steady_current_A(battery, battery.dod_max, most_W)
+    current_A = 1.05 * steady_current_A(battery, battery.dod_max, most_W)
     resistance = "56 mohm Ah per cell, as the S500"
     cell = "a cell of the S500"
 

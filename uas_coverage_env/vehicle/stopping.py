@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import (
     BOUND,
     ON_REFERENCE,
@@ -17,7 +18,6 @@ from uas_coverage_env.vehicle.governor import (
     design_velocity_loop,
     horizontal_axis,
 )
-from uas_coverage_env.vehicle.layout import POSITION, SPEED
 from uas_coverage_env.vehicle.params import VehicleParams
 
 FloatArray = NDArray[np.float64]
@@ -62,19 +62,19 @@ def stopping_of(vehicle: VehicleParams, dt_s: float) -> Stopping:
         x, reference = _flown(vehicle, loop, axis, x, reference, -full_mps)
         states.append(x)
         references.append(reference)
-        if abs(x[0, SPEED] + full_mps) < _ARRIVED * full_mps:
+        if abs(x[0, S.SPEED] + full_mps) < _ARRIVED * full_mps:
             break
     x, reference = np.concatenate(states), np.concatenate(references)
-    x[:, POSITION] = 0.0
+    x[:, S.POSITION] = 0.0
     moving = 0
     for step in range(1, most + 1):
         x, reference = _flown(vehicle, loop, axis, x, reference, 0.0)
-        if (np.abs(x[:, SPEED]) > AT_REST_MPS).any():
+        if (np.abs(x[:, S.SPEED]) > AT_REST_MPS).any():
             moving = step
-        elif np.abs(x[:, SPEED:]).max() < _ARRIVED * AT_REST_MPS:
+        elif np.abs(x[:, S.SPEED :]).max() < _ARRIVED * AT_REST_MPS:
             break
     level_s = (moving + 1) * dt_s
-    return Stopping(max(level_s, _vertical_s(vehicle, dt_s)), float(x[0, POSITION]))
+    return Stopping(max(level_s, _vertical_s(vehicle, dt_s)), float(x[0, S.POSITION]))
 
 
 def _flown(
@@ -89,7 +89,7 @@ def _flown(
     A, B = axis
     moved = wanted_mps - reference
     rows, per_reference = loop.rows[:, :ON_REFERENCE], loop.rows[:, ON_REFERENCE]
-    held = x[:, SPEED:] @ rows.T + np.outer(reference, per_reference)
+    held = x[:, S.SPEED :] @ rows.T + np.outer(reference, per_reference)
     change = np.outer(moved, per_reference)
     # each row allows the share at which it meets the bound on the side to which it moves
     room = np.where(change > 0.0, loop.rows[:, BOUND] - held, loop.rows[:, BOUND] + held)
@@ -97,7 +97,7 @@ def _flown(
     share = np.divide(room, np.abs(change), out=np.full_like(room, np.inf), where=ends)
     reference = reference + np.clip(share.min(axis=1), 0.0, 1.0) * moved
     at_rest = np.array([1.0, vehicle.trim_tilt_rad_per_mps, 0.0])
-    alpha = (np.outer(reference, at_rest) - x[:, SPEED:]) @ loop.gain
+    alpha = (np.outer(reference, at_rest) - x[:, S.SPEED :]) @ loop.gain
     return x @ A.T + np.outer(alpha, B), reference
 
 

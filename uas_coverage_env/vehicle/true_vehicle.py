@@ -10,11 +10,9 @@ another power.
 import math
 from typing import NamedTuple
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, stack_array
-from uas_coverage_env.vehicle.battery import battery_current_A
-from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED, TILT
-
-_current = kernel(battery_current_A)
+from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel, stack_array
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.discharge import write_true_battery
 
 
 class Perturbation(NamedTuple):
@@ -81,7 +79,9 @@ def write_true_vehicle(nominal, true):
     true.lift_surplus_N = nominal.weight_N * (change[THRUST] - change[MASS])
     true.power_factor = nominal.power_factor * (1.0 + change[POWER])
     _write_motion(true)
-    _write_battery(nominal, true)
+    write_true_battery(
+        nominal, true, 1.0 + change[POWER], 1.0 + change[CAPACITY], 1.0 + change[RESISTANCE]
+    )
 
 
 @inlined_kernel
@@ -91,14 +91,16 @@ def _write_motion(true):
     series = stack_array(_TERMS)
     write_series(true.dt_s, true.drag_kgps / mass, series)
     A, B = true.axis_A, true.axis_B
-    A[POSITION, SPEED], A[SPEED, SPEED] = series[1], series[0]
-    A[POSITION, TILT], A[POSITION, RATE], B[POSITION] = g * series[2], g * series[3], g * series[4]
-    A[SPEED, TILT], A[SPEED, RATE], B[SPEED] = g * series[1], g * series[2], g * series[3]
-    true.horizontal_force_B[POSITION] = series[2] / mass
-    true.horizontal_force_B[SPEED] = series[1] / mass
+    for row in (S.POSITION, S.SPEED):
+        # from tilt to position there is one more integration than to speed
+        k = 1 - row
+        A[row, S.SPEED], A[row, S.TILT] = series[k], g * series[k + 1]
+        A[row, S.RATE], B[row] = g * series[k + 2], g * series[k + 3]
+    true.horizontal_force_B[S.POSITION] = series[2] / mass
+    true.horizontal_force_B[S.SPEED] = series[1] / mass
     write_series(true.dt_s, true.drag_vertical_kgps / mass, series)
-    true.vertical_A[POSITION, SPEED], true.vertical_A[SPEED, SPEED] = series[1], series[0]
-    true.vertical_B[POSITION], true.vertical_B[SPEED] = -series[2] / mass, -series[1] / mass
+    true.vertical_A[S.POSITION, S.SPEED], true.vertical_A[S.SPEED, S.SPEED] = series[1], series[0]
+    true.vertical_B[S.POSITION], true.vertical_B[S.SPEED] = -series[2] / mass, -series[1] / mass
 
 
 @inlined_kernel
@@ -121,23 +123,3 @@ def write_series(dt_s, rate_per_s, series):
         for k in range(j + 1, _ORDER + 1):
             term *= -rate_per_s * dt_s / k
             series[j] += term
-
-
-@inlined_kernel
-def _write_battery(nominal, true):
-    """Capacity, resistances, and the linearised current of these resistances and this power."""
-    change = true.perturbation
-    more_resistance, more_power = 1.0 + change[RESISTANCE], 1.0 + change[POWER]
-    true.capacity_As = (1.0 + change[CAPACITY]) * nominal.capacity_As
-    true.resistance_0_ohm = more_resistance * nominal.resistance_0_ohm
-    true.resistance_th_ohm = more_resistance * nominal.resistance_th_ohm
-    true.hover_W = more_power * nominal.hover_W
-    for j in range(nominal.n_segments):
-        behind = nominal.ocv_V[j] - nominal.drop_V[j]
-        hover = _current(behind, true.resistance_0_ohm, true.hover_W)
-        stiffness = behind - 2.0 * true.resistance_0_ohm * hover
-        believed = behind - 2.0 * nominal.resistance_0_ohm * nominal.current_A[j]
-        true.current_A[j] = hover
-        true.current_A_per_V[j] = hover / stiffness
-        slope_W_per_N = more_power * believed * nominal.current_A_per_N[j]
-        true.current_A_per_N[j] = slope_W_per_N / stiffness

@@ -19,15 +19,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
-from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED
 from uas_coverage_env.vehicle.params import VehicleParams
 
 FORGETS_S = 2.0
 """The belief in wind and sink follows what is seen with this time constant [s]."""
 
 _STEPS = 400
-_BELIEF = RATE + 1  # the fifth state
+_BELIEF = S.RATE + 1  # the fifth state
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ def tube_of(vehicle: VehicleParams, dt_s: float, steps: int, learns: bool = Fals
     closed[:_BELIEF] -= np.outer(B, gain)
     closed[_BELIEF, _BELIEF] = 1.0 - learnt
     # a step in wind is a step in still air at the airspeed, moved by what the air moves
-    response = np.append(-A[:, SPEED], learnt)
-    response[POSITION] += dt_s
-    response[SPEED] += 1.0
+    response = np.append(-A[:, S.SPEED], learnt)
+    response[S.POSITION] += dt_s
+    response[S.SPEED] += 1.0
     total, alpha, position_m = np.zeros(len(response)), 0.0, [0.0]
     for _ in range(max(_STEPS, steps)):
         total += np.abs(response)

@@ -12,7 +12,7 @@ from uas_coverage_env.entities.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.features.feature import FEATURE_DTYPE, Feature, feature_tables
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
-from uas_coverage_env.vehicle.compiled import VEHICLE_DTYPE
+from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
 from uas_coverage_env.vehicle.stopping import stopping_of
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
 from uas_coverage_env.world.corners import route_corners
@@ -147,8 +147,8 @@ class Arena(NamedTuple):
     """As many in all missions of a pool."""
     feature_words: Annotated[NDArray[np.uint64], "feature words"]
     """Their records."""
-    perturbed: Annotated[NDArray[np.int64], "true vehicles"]
-    """The UAS whose vehicles features may make others than is believed: all, or none."""
+    true_uas: Annotated[NDArray[np.int64], "true vehicles"]
+    """The UAS with a record in `WorldState.true_vehicles`: all, or none."""
     events: Annotated[NDArray[np.void], EVENT_DTYPE, "E"]
     sensing: Annotated[NDArray[np.void], SENSING_DTYPE, "S"]
     """One for each UAS, or none where they are known as they are."""
@@ -229,7 +229,7 @@ def build_arena(
         node_distance_m=corners.distance_m,
         features=feature_rows,
         feature_words=feature_words,
-        perturbed=np.arange(len(uas) if any(f and f.perturbs for f in features) else 0),
+        true_uas=np.arange(len(uas) if has_true_vehicles(scenario, features) else 0),
         events=event_records(scenario, features),
         sensing=sensing_records(scenario),
         packs=pack_records(scenario),
@@ -245,6 +245,12 @@ def _vehicles(scenario: Scenario) -> NDArray[np.void]:
         records[i] = compiled[vehicle]
     records["follows_course"] = [uas.heading == "course" for uas in scenario.uas]
     return records
+
+
+def has_true_vehicles(scenario: Scenario, features: Sequence[Feature | None]) -> bool:
+    """Whether vehicles may differ from their files, or batteries have a memory beside x."""
+    perturbed = any(each is not None and each.perturbs for each in features)
+    return perturbed or any(vehicle.battery.rc for vehicle in scenario.vehicles)
 
 
 def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

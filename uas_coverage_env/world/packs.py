@@ -21,6 +21,7 @@ from uas_coverage_env.geometry import cylinder_clearance, outside_cylinder
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import landing, take_off
 from uas_coverage_env.vehicle import DOD, U_TH, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle.parts import MAX_FURTHER_PAIRS
 from uas_coverage_env.world.contacts import obstacle_breaches
 from uas_coverage_env.world.coverage import can_cover
 from uas_coverage_env.world.events import steps_until
@@ -39,6 +40,7 @@ PACKS_DTYPE = record_dtype(
         # a fresh one at the start
         ("dod", "f8"),
         ("u_th_V", "f8"),
+        ("further_V", "f8", (MAX_FURTHER_PAIRS,)),
     ]
 )
 
@@ -60,7 +62,8 @@ def pack_records(scenario: Scenario) -> NDArray[np.void]:
             up = take_off(scenario, i)
             down = landing(scenario, i, uas.start_m, uas.dod_max, 0.0)
             seconds += down.time_s + up.time_s
-            record["dod"], record["u_th_V"] = up.dod, up.u_th_V
+            record["dod"], (record["u_th_V"], *further_V) = up.battery
+            record["further_V"][: len(further_V)] = further_V
         record["number"] = sorties.packs
         record["swap_steps"] = steps_until(seconds, scenario.dt_s)
     return records
@@ -173,6 +176,9 @@ def _take_off(arena, state, i, out):
     state.uas[i].returning = False
     state.x[i, DOD] = pack.dod
     state.x[i, U_TH] = pack.u_th_V
+    if state.true_vehicles.shape[0] > 0:
+        for p in range(MAX_FURTHER_PAIRS):
+            state.true_vehicles[i].further_V[p] = pack.further_V[p]
     kept = state.packs[i]
     kept.number += 1
     kept.covered = False

@@ -8,7 +8,8 @@ from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, LEAD_S
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import fly_kinematics
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 
 _LANDING_SHARE = 0.9
@@ -25,16 +26,16 @@ _BRAKES = np.array([1.0, 0.4, 0.2, 0.0, -0.05, -0.1, -0.2, -0.3])
 @allocating_kernel
 def _homewards(uas, rules, x, speed_mps, values):
     """Write the velocity (north, east) and altitude that flies straight home at a speed."""
-    dx, dy = uas.home_m[0] - x[X], uas.home_m[1] - x[Y]
-    way_m, now_mps = math.hypot(dx, dy), math.hypot(x[VX], x[VY])
+    dx, dy = uas.home_m[0] - x[S.X], uas.home_m[1] - x[S.Y]
+    way_m, now_mps = math.hypot(dx, dy), math.hypot(x[S.VX], x[S.VY])
     lead_s = min(LEAD_S, way_m / (2.0 * now_mps + 1e-9))
-    dx, dy = dx - lead_s * x[VX], dy - lead_s * x[VY]
+    dx, dy = dx - lead_s * x[S.VX], dy - lead_s * x[S.VY]
     length_m = math.hypot(dx, dy) + 1e-9
     values[0], values[1] = speed_mps * dx / length_m, speed_mps * dy / length_m
     glide_m = -uas.home_m[2] + uas.descent_mps * max(way_m / uas.speed_mps - _GLIDE_S, 0.0)
-    values[2] = min(glide_m, max(-x[Z], rules.floor_m + CRUISE_ALTITUDE_M))
+    values[2] = min(glide_m, max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M))
     next_m = math.hypot(
-        uas.home_m[0] - x[X] - rules.dt_s * x[VX], uas.home_m[1] - x[Y] - rules.dt_s * x[VY]
+        uas.home_m[0] - x[S.X] - rules.dt_s * x[S.VX], uas.home_m[1] - x[S.Y] - rules.dt_s * x[S.VY]
     )
     lowest_m = rules.floor_m
     if next_m > rules.landing_zone_m - 1.0 and rules.min_height_m > 0.0:
@@ -45,8 +46,8 @@ def _homewards(uas, rules, x, speed_mps, values):
 @allocating_kernel
 def _cautious_mps(uas, x):
     """Speed homewards that comes to rest at home without being planned."""
-    way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
-    left_m = max(way_m - min(LEAD_S * math.hypot(x[VX], x[VY]), 0.5 * way_m), 0.0)
+    way_m = math.hypot(uas.home_m[0] - x[S.X], uas.home_m[1] - x[S.Y])
+    left_m = max(way_m - min(LEAD_S * math.hypot(x[S.VX], x[S.VY]), 0.5 * way_m), 0.0)
     return min(uas.speed_mps, math.sqrt(3.4 * left_m), 0.5 * left_m)
 
 
@@ -75,13 +76,13 @@ def towards_home(vehicle, uas, rules, x, reference, values, command):
         values: (3,) written: velocity north and east [m/s], altitude [m].
         command: A record of COMMAND_DTYPE; written.
     """
-    way_m = math.hypot(uas.home_m[0] - x[X], uas.home_m[1] - x[Y])
+    way_m = math.hypot(uas.home_m[0] - x[S.X], uas.home_m[1] - x[S.Y])
     _homewards(uas, rules, x, _cautious_mps(uas, x), values)
     if way_m > _BRAKING_FROM_S * uas.speed_mps:
         return
-    on, on_reference = np.zeros(N_STATES), np.zeros(2)
-    there, governed = np.zeros(N_STATES), np.zeros(2)
-    u, trial, first = np.zeros(N_INPUTS), np.zeros(3), np.zeros(3)
+    on, on_reference = np.zeros(S.N_STATES), np.zeros(2)
+    there, governed = np.zeros(S.N_STATES), np.zeros(2)
+    u, trial, first = np.zeros(S.N_INPUTS), np.zeros(3), np.zeros(3)
     most = 2 * _BRAKING_STEPS
     for speed in _SPEEDS:
         on[:] = x
@@ -90,9 +91,9 @@ def towards_home(vehicle, uas, rules, x, reference, values, command):
             for brake in _BRAKES:
                 there[:] = on
                 governed[:] = on_reference
-                now_mps = math.hypot(there[VX], there[VY]) + 1e-9
-                north = -brake * uas.speed_mps * there[VX] / now_mps
-                east = -brake * uas.speed_mps * there[VY] / now_mps
+                now_mps = math.hypot(there[S.VX], there[S.VY]) + 1e-9
+                north = -brake * uas.speed_mps * there[S.VX] / now_mps
+                east = -brake * uas.speed_mps * there[S.VY] / now_mps
                 for steps in range(held + 1, min(held + _BRAKING_STEPS, most)):
                     _homewards(uas, rules, there, 0.0, trial)
                     if steps == 1:

@@ -19,18 +19,9 @@ from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.vehicle import (
-    N_INPUTS,
-    N_STATES,
-    PHI,
-    THETA,
-    VX,
-    VY,
-    VZ,
-    X,
-    Y,
-    Z,
     fly_kinematics,
 )
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import NO_WAY, ROUND_CORNER, crossing, route
 
@@ -81,7 +72,7 @@ def aim_ahead(vehicle, x, ahead, aims_m):
             if ahead[k, IS_HOME] > 0.0:
                 break
             at, following = ahead[k], aims_m[k + 1]
-            bx, by, bz = x[X], x[Y], x[Z]
+            bx, by, bz = x[S.X], x[S.Y], x[S.Z]
             if k > 0:
                 bx, by, bz = aims_m[k - 1, 0], aims_m[k - 1, 1], aims_m[k - 1, 2]
             off_m = 0.5 * at[RADIUS]
@@ -116,7 +107,7 @@ def observe_places(x, reference, speed_mps, first, second, third, row):
     Returns:
         Time [s] straight along the places at full speed, which the network's output is added to.
     """
-    dx, dy = first[NORTH] - x[X], first[EAST] - x[Y]
+    dx, dy = first[NORTH] - x[S.X], first[EAST] - x[S.Y]
     way_m = math.hypot(dx, dy)
     ex, ey = 1.0, 0.0
     if way_m > 1e-3:
@@ -127,10 +118,10 @@ def observe_places(x, reference, speed_mps, first, second, third, row):
     px, py = -side * ey, side * ex
     row[WAY] = way_m / _LENGTH_M
     row[FIRST_RADIUS] = first[RADIUS] / _RADIUS_M
-    row[ALONG] = (x[VX] * ex + x[VY] * ey) / _SPEED_MPS
-    row[ACROSS] = (x[VX] * px + x[VY] * py) / _SPEED_MPS
-    row[TILT_ALONG] = (-x[THETA] * ex + x[PHI] * ey) / _TILT_RAD
-    row[TILT_ACROSS] = (-x[THETA] * px + x[PHI] * py) / _TILT_RAD
+    row[ALONG] = (x[S.VX] * ex + x[S.VY] * ey) / _SPEED_MPS
+    row[ACROSS] = (x[S.VX] * px + x[S.VY] * py) / _SPEED_MPS
+    row[TILT_ALONG] = (-x[S.THETA] * ex + x[S.PHI] * ey) / _TILT_RAD
+    row[TILT_ACROSS] = (-x[S.THETA] * px + x[S.PHI] * py) / _TILT_RAD
     row[LOOP_ALONG] = (reference[0] * ex + reference[1] * ey) / _SPEED_MPS
     row[LOOP_ACROSS] = (reference[0] * px + reference[1] * py) / _SPEED_MPS
     row[SECOND_ALONG] = (ax * ex + ay * ey) / _LENGTH_M
@@ -139,9 +130,9 @@ def observe_places(x, reference, speed_mps, first, second, third, row):
     row[THIRD_ALONG] = (bx * ex + by * ey) / _LENGTH_M
     row[THIRD_ACROSS] = (bx * px + by * py) / _LENGTH_M
     row[THIRD_RADIUS] = third[RADIUS] / _RADIUS_M
-    row[FIRST_DOWN] = (first[DOWN] - x[Z]) / _RISE_M
+    row[FIRST_DOWN] = (first[DOWN] - x[S.Z]) / _RISE_M
     row[SECOND_DOWN] = (second[DOWN] - first[DOWN]) / _RISE_M
-    row[DESCENT] = x[VZ] / _CLIMB_MPS
+    row[DESCENT] = x[S.VZ] / _CLIMB_MPS
     row[FIRST_IS_HOME] = first[IS_HOME]
     row[SECOND_IS_HOME] = second[IS_HOME]
     row[THIRD_IS_HOME] = third[IS_HOME]
@@ -168,11 +159,11 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
         command: A record of COMMAND_DTYPE; written.
     """
     aim_ahead(vehicle, x, ahead, aims_m)
-    to_first = math.atan2(aims_m[0, 1] - x[Y], aims_m[0, 0] - x[X])
-    turn = math.atan2(aims_m[1, 1] - x[Y], aims_m[1, 0] - x[X]) - to_first
+    to_first = math.atan2(aims_m[0, 1] - x[S.Y], aims_m[0, 0] - x[S.X])
+    turn = math.atan2(aims_m[1, 1] - x[S.Y], aims_m[1, 0] - x[S.X]) - to_first
     turn = math.atan2(math.sin(turn), math.cos(turn))
     sign = 1.0 if turn > 0.0 else -1.0
-    there, governed, u = np.zeros(N_STATES), np.zeros(2), np.zeros(N_INPUTS)
+    there, governed, u = np.zeros(S.N_STATES), np.zeros(2), np.zeros(S.N_INPUTS)
     row = np.empty(N_FLIGHT)
     n, most = 0, HORIZON
     for q in range(-_TURNS_BACK, _TURNS_ON):
@@ -191,7 +182,7 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
                 costs[n] += _TOO_LATE_S
             n += 1
     left = costs.copy()
-    held, held_reference = np.zeros(N_STATES), np.zeros(2)
+    held, held_reference = np.zeros(S.N_STATES), np.zeros(2)
     for _ in range(_CHANGED):
         first = left.argmin()
         left[first] = np.inf
@@ -217,7 +208,7 @@ def weigh(vehicle, speed_mps, x, reference, ahead, layers, aims_m, commands, cos
 def covers(x, at):
     """Whether a state covers a place, with something to spare."""
     within_m = max(0.985 * at[RADIUS] - _WITHIN_M, 0.5 * at[RADIUS])
-    dx, dy, dz = x[X] - at[NORTH], x[Y] - at[EAST], x[Z] - at[DOWN]
+    dx, dy, dz = x[S.X] - at[NORTH], x[S.Y] - at[EAST], x[S.Z] - at[DOWN]
     return dx * dx + dy * dy + dz * dz <= within_m * within_m
 
 
@@ -282,13 +273,13 @@ def _is_safe(arena, i, x, reference, command, n_held, least_m, path_m):
 @allocating_kernel
 def over_roofs(arena, x, end_x, end_y, end_altitude_m, uas, leg):
     """Altitude [m] at which a leg passes over what is low; the speed that leaves time to climb."""
-    altitude_m = -x[Z]
-    length_m = math.hypot(end_x - x[X], end_y - x[Y])
+    altitude_m = -x[S.Z]
+    length_m = math.hypot(end_x - x[S.X], end_y - x[S.Y])
     needed_m, speed_mps = -math.inf, uas.speed_mps
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         at, over, ends = crossing(
-            obstacle, arena.normals, arena.offsets_m, x[X], x[Y], end_x, end_y
+            obstacle, arena.normals, arena.offsets_m, x[S.X], x[S.Y], end_x, end_y
         )
         if at > 1.0 or not passes_over(obstacle, over, ends, leg, max(altitude_m, end_altitude_m)):
             continue
@@ -317,13 +308,13 @@ def places_ahead(arena, i, x, targets, n_targets, ahead):
     """
     target = targets[0] if n_targets > 0 else arena.waypoints.shape[0] + i
     to_m = arena.waypoints[targets[0]].position_m if n_targets > 0 else arena.uas[i].home_m
-    end_x, end_y, _, leg = route(arena, target, x[X], x[Y], x[Z], to_m[0], to_m[1], to_m[2])
+    end_x, end_y, _, leg = route(arena, target, x[S.X], x[S.Y], x[S.Z], to_m[0], to_m[1], to_m[2])
     needed_m, speed_mps = over_roofs(arena, x, end_x, end_y, -to_m[2], arena.uas[i], leg)
     ahead[:] = 0.0
     n = 0
     if leg == ROUND_CORNER:
         ahead[0, NORTH], ahead[0, EAST] = end_x, end_y
-        ahead[0, DOWN] = min(to_m[2], x[Z]) if n_targets > 0 else x[Z]
+        ahead[0, DOWN] = min(to_m[2], x[S.Z]) if n_targets > 0 else x[S.Z]
         ahead[0, RADIUS] = CORNER_M
         n = 1
     for k in range(n, AHEAD):
@@ -389,7 +380,7 @@ def steer_to(
         arena.vehicles[i], uas.speed_mps, x, reference, ahead, layers, aims_m, commands, costs,
         command,
     )  # fmt: skip
-    floor_m = max(lowest_altitude(arena, i, x[X], x[Y]), needed_m)
+    floor_m = max(lowest_altitude(arena, i, x[S.X], x[S.Y]), needed_m)
     share = min(1.0, speed_mps / uas.speed_mps)
     for n_held in (MOST_HELD, least_held):
         left = costs.copy()

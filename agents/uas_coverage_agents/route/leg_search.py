@@ -39,7 +39,7 @@ from uas_coverage_env.autopilot.lookahead import (
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import COMMAND_DTYPE
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import NO_WAY, route
@@ -113,9 +113,9 @@ def search_workspace(
     return Workspace(
         tries=tries,
         slow_starts=slow_starts,
-        x=np.zeros(N_STATES),
+        x=np.zeros(S.N_STATES),
         reference=np.zeros(2),
-        u=np.zeros(N_INPUTS),
+        u=np.zeros(S.N_INPUTS),
         command=np.zeros(1, COMMAND_DTYPE),
         row=np.zeros(N_FLIGHT),
         path_m=np.zeros((HORIZON + _BRAKING + 1, 3)),
@@ -142,9 +142,9 @@ def _step(vehicle, values, workspace, belief):
 @allocating_kernel
 def _note(workspace, n):
     workspace.path_m[n, 0], workspace.path_m[n, 1], workspace.path_m[n, 2] = (
-        workspace.x[X],
-        workspace.x[Y],
-        workspace.x[Z],
+        workspace.x[S.X],
+        workspace.x[S.Y],
+        workspace.x[S.Z],
     )
 
 
@@ -159,7 +159,7 @@ def _is_clear(arena, i, x, reference, first, steps, workspace, belief):
         )
         n += 1
         _note(workspace, n)
-        if math.hypot(workspace.x[VX], workspace.x[VY]) < _STANDS_MPS:
+        if math.hypot(workspace.x[S.VX], workspace.x[S.VY]) < _STANDS_MPS:
             break
     slack_m = fixed_slack(arena, i, workspace.path_m[: n + 1], n, 0.0, PLENTY_M)
     if moving_slack(arena, 0, i, workspace.path_m[: n + 1], 0.0, slack_m) < 0.0:
@@ -200,7 +200,7 @@ def _weigh(arena, around, i, x, reference, plan, layers, best_s, workspace, beli
         cost_s += value_of(layers, workspace.row)
     else:
         # with the places after it, as in the time of a plan that covers it
-        way_m = math.hypot(ahead[0, NORTH] - there[X], ahead[0, EAST] - there[Y])
+        way_m = math.hypot(ahead[0, NORTH] - there[S.X], ahead[0, EAST] - there[S.Y])
         for k in range(1, AHEAD):
             way_m += math.hypot(
                 ahead[k, NORTH] - ahead[k - 1, NORTH], ahead[k, EAST] - ahead[k - 1, EAST]
@@ -228,18 +228,25 @@ def _aim(arena, around, i, x, reference, plan, first, way, share, workspace, bel
             if way != STRAIGHT:
                 known = around if way == ROUND else arena
                 north_m, east_m, _, leg = route(
-                    known, workspace.rows[k], there[X], there[Y], there[Z], north_m, east_m, down_m
+                    known,
+                    workspace.rows[k],
+                    there[S.X],
+                    there[S.Y],
+                    there[S.Z],
+                    north_m,
+                    east_m,
+                    down_m,
                 )
                 needed_m, most_mps = over_roofs(known, there, north_m, east_m, -down_m, uas, leg)
                 altitude_m, speed_mps = max(altitude_m, needed_m), min(speed_mps, most_mps)
-            north_m, east_m = north_m - there[X], east_m - there[Y]
-            now_mps = math.hypot(there[VX], there[VY])
+            north_m, east_m = north_m - there[S.X], east_m - there[S.Y]
+            now_mps = math.hypot(there[S.VX], there[S.VY])
             lead_s = min(_LEAD_S, math.hypot(north_m, east_m) / (2.0 * now_mps + 1e-9))
-            north_m, east_m = north_m - lead_s * there[VX], east_m - lead_s * there[VY]
+            north_m, east_m = north_m - lead_s * there[S.VX], east_m - lead_s * there[S.VY]
             length_m = math.hypot(north_m, east_m) + 1e-9
             plan[step, 0] = speed_mps * north_m / length_m
             plan[step, 1] = speed_mps * east_m / length_m
-            plan[step, 2] = max(altitude_m, lowest_altitude(arena, i, there[X], there[Y]))
+            plan[step, 2] = max(altitude_m, lowest_altitude(arena, i, there[S.X], there[S.Y]))
         _step(arena.vehicles[i], plan[step], workspace, belief)
         if k == 0 and covers(there, workspace.ahead[0]):
             k = 1
@@ -296,7 +303,7 @@ def _begin(arena, around, i, x, reference, layers, plan, kept, has_base, workspa
         return best_s, used, way
     for held in range(_BRAKED):
         trial[:held, :2] = 0.0
-        trial[:held, 2] = -x[Z]
+        trial[:held, 2] = -x[S.Z]
         for begins in (OVER, ROUND, STRAIGHT):
             for share in _SLOW_SPEEDS:
                 _aim(arena, around, i, x, reference, trial, held, begins, share, workspace, belief)

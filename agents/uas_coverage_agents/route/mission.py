@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from uas_coverage_agents.route.clock import Mission
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
-from uas_coverage_env.vehicle import DOD, VX, VY
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import FLYING, SwarmState, build_arena
 
 WEIGHT = 0.6
@@ -50,7 +50,7 @@ class MissionMaker:
         """
         legs, x = self._legs, swarm.x
         n_uas = len(x)
-        battery_s = (self._uas["dod_max"] - x[:, DOD]) / self._uas["dod_per_s"]
+        battery_s = (self._uas["dod_max"] - x[:, S.DOD]) / self._uas["dod_per_s"]
         left_s = np.minimum(battery_s, self._until_s - swarm.time_s)
         here_home_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
         here_home_s = np.where(swarm.departed, _LEGS * here_home_s + TRAJECTORY.landing_s, 0.0)
@@ -61,7 +61,7 @@ class MissionMaker:
             home_s=_LEGS * legs.home_s + TRAJECTORY.landing_s,
             start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
             here_m=np.ascontiguousarray(x[:, :2]),
-            velocity=np.ascontiguousarray(x[:, VX : VY + 1]) / self._speed_mps,
+            velocity=np.ascontiguousarray(x[:, S.VX : S.VY + 1]) / self._speed_mps,
             from_s=_LEGS * np.array([legs.from_here_s(u, x[u, :3]) for u in range(n_uas)]),
             here_home_s=here_home_s,
             budget_s=left_s - TRAJECTORY_RESERVE.kept_s,

@@ -22,7 +22,7 @@ from uas_coverage_agents.route.leg_flight import (
 )
 from uas_coverage_env.autopilot.guidance import LEAD_S
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.routes import CLEAR, ROUND_CORNER, leg_from_corner, route
 
 
@@ -43,7 +43,7 @@ def write_place(arena, i, targets, n_targets, k, place):
 @allocating_kernel
 def _over_s(x, uas, to, way_m, needed_m):
     """Time [s] of a way over roofs: flown, or climbed and descended, whichever is longer."""
-    rise_s = max(needed_m + x[Z], 0.0) / uas.climb_mps
+    rise_s = max(needed_m + x[S.Z], 0.0) / uas.climb_mps
     sink_s = max(needed_m + to[DOWN] - to[RADIUS], 0.0) / uas.descent_mps
     return max(way_m / uas.speed_mps, rise_s + sink_s)
 
@@ -61,14 +61,16 @@ def detour_s(arena, around, i, row, x, to):
         to: (5,) the place.
     """
     uas = arena.uas[i]
-    straight_m = math.hypot(to[NORTH] - x[X], to[EAST] - x[Y])
-    end_x, end_y, way_m, leg = route(arena, row, x[X], x[Y], x[Z], to[NORTH], to[EAST], to[DOWN])
+    straight_m = math.hypot(to[NORTH] - x[S.X], to[EAST] - x[S.Y])
+    end_x, end_y, way_m, leg = route(
+        arena, row, x[S.X], x[S.Y], x[S.Z], to[NORTH], to[EAST], to[DOWN]
+    )
     if leg == CLEAR:
         return 0.0
     needed_m, _ = over_roofs(arena, x, end_x, end_y, -to[DOWN], uas, leg)
     seconds = _over_s(x, uas, to, way_m, needed_m)
-    if needed_m + x[Z] > 0.0:
-        _, _, way_m, leg = route(around, row, x[X], x[Y], x[Z], to[NORTH], to[EAST], to[DOWN])
+    if needed_m + x[S.Z] > 0.0:
+        _, _, way_m, leg = route(around, row, x[S.X], x[S.Y], x[S.Z], to[NORTH], to[EAST], to[DOWN])
         if leg == ROUND_CORNER:
             seconds = min(seconds, way_m / uas.speed_mps)
     return seconds - straight_m / uas.speed_mps
@@ -99,16 +101,16 @@ def places_along(arena, around, i, x, targets, n_targets, ahead):
     to = np.empty(5)
     row = write_place(arena, i, targets, n_targets, 0, to)
     corner = leg == ROUND_CORNER
-    if needed_m > max(-x[Z], -to[DOWN]):
-        over_s = _over_s(x, uas, to, math.hypot(to[NORTH] - x[X], to[EAST] - x[Y]), needed_m)
+    if needed_m > max(-x[S.Z], -to[DOWN]):
+        over_s = _over_s(x, uas, to, math.hypot(to[NORTH] - x[S.X], to[EAST] - x[S.Y]), needed_m)
         north_m, east_m, way_m, round_leg = route(
-            around, row, x[X], x[Y], x[Z], to[NORTH], to[EAST], to[DOWN]
+            around, row, x[S.X], x[S.Y], x[S.Z], to[NORTH], to[EAST], to[DOWN]
         )
         if round_leg == ROUND_CORNER and way_m / uas.speed_mps < over_s + LEAD_S:
             corner, leg = True, ROUND_CORNER
             ahead[0] = 0.0
             ahead[0, NORTH], ahead[0, EAST], ahead[0, RADIUS] = north_m, east_m, CORNER_M
-            ahead[0, DOWN] = min(to[DOWN], x[Z]) if n_targets > 0 else x[Z]
+            ahead[0, DOWN] = min(to[DOWN], x[S.Z]) if n_targets > 0 else x[S.Z]
             needed_m, speed_mps = over_roofs(around, x, north_m, east_m, -to[DOWN], uas, leg)
     k, j = (1, 0) if corner else (0, 0)
     while k < AHEAD:

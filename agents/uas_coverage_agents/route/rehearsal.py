@@ -22,7 +22,7 @@ from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import fly_kinematically
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
-from uas_coverage_env.vehicle import N_STATES, VZ, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import Arena
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 
@@ -70,7 +70,7 @@ class Flights(NamedTuple):
 def _room(n: int, n_waypoints: int, most_steps: int) -> Flights:
     """For so many flights."""
     return Flights(
-        x=np.zeros((n, N_STATES)),
+        x=np.zeros((n, S.N_STATES)),
         reference=np.zeros((n, 2)),
         plan=np.zeros((n, HORIZON, 3)),
         kept=np.zeros(n, np.bool_),
@@ -101,7 +101,7 @@ def _forget_covered(arena, left, n, x):
     kept = 0
     for k in range(n):
         at = arena.waypoints[left[k]]
-        dx, dy, dz = x[X] - at.position_m[0], x[Y] - at.position_m[1], x[Z] - at.position_m[2]
+        dx, dy, dz = x[S.X] - at.position_m[0], x[S.Y] - at.position_m[1], x[S.Z] - at.position_m[2]
         if dx * dx + dy * dy + dz * dz > at.radius_m * at.radius_m:
             left[kept] = left[k]
             kept += 1
@@ -301,7 +301,7 @@ class Rehearsal:
         goes_as_rehearsed = (
             len(commands) > 0
             and np.array_equal(route, left)
-            and np.abs(x[: VZ + 1] - expected[: VZ + 1]).max() < _SAME
+            and np.abs(x[: S.VZ + 1] - expected[: S.VZ + 1]).max() < _SAME
         )
         if not goes_as_rehearsed:
             self._flights[u] = None

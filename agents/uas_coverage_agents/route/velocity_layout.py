@@ -29,7 +29,7 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.env.observation import Feature, Group
 from uas_coverage_env.env.observation.surroundings import free_way
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.height import lowest_altitude
 
 LAYOUT = "route_velocity_v2"
@@ -150,7 +150,7 @@ def _cast_rays(arena, x, north, east, side, angles_rad, row):
     for k in range(angles_rad.shape[0]):
         along, across = math.cos(angles_rad[k]), side * math.sin(angles_rad[k])
         dx, dy = along * north - across * east, along * east + across * north
-        row[k] = 1.0 - free_way(arena, x[X], x[Y], x[Z], dx, dy, 0.0, _RAY_M) / _RAY_M
+        row[k] = 1.0 - free_way(arena, x[S.X], x[S.Y], x[S.Z], dx, dy, 0.0, _RAY_M) / _RAY_M
 
 
 @allocating_kernel
@@ -184,7 +184,7 @@ def observe_route(arena, i, x, reference, targets, n_targets, row, frame):
     ahead, aims_m = np.empty((AHEAD, 5)), np.empty((AHEAD, 3))
     leg, needed_m, speed_mps = places_ahead(arena, i, x, targets, n_targets, ahead)
     aim_ahead(arena.vehicles[i], x, ahead, aims_m)
-    dx, dy = aims_m[0, 0] - x[X], aims_m[0, 1] - x[Y]
+    dx, dy = aims_m[0, 0] - x[S.X], aims_m[0, 1] - x[S.Y]
     way_m = math.hypot(dx, dy)
     ex, ey = 1.0, 0.0
     if way_m > 1e-3:
@@ -192,21 +192,21 @@ def observe_route(arena, i, x, reference, targets, n_targets, row, frame):
     on_x, on_y = aims_m[1, 0] - aims_m[0, 0], aims_m[1, 1] - aims_m[0, 1]
     side = 1.0 if ex * on_y - ey * on_x >= 0.0 else -1.0
     px, py = -side * ey, side * ex
-    aim_m, floor_m = -aims_m[0, 2], max(lowest_altitude(arena, i, x[X], x[Y]), needed_m)
+    aim_m, floor_m = -aims_m[0, 2], max(lowest_altitude(arena, i, x[S.X], x[S.Y]), needed_m)
     aimed_m = min(max(aim_m, floor_m), max(arena.rules[0].ceiling_m, aim_m))
     frame[ALONG_NORTH], frame[ALONG_EAST] = ex, ey
     frame[ACROSS_NORTH], frame[ACROSS_EAST] = px, py
     frame[AIMED_M] = aimed_m
 
-    row[_OWN.velocity] = (x[VX] * ex + x[VY] * ey) / _SPEED_MPS
-    row[_OWN.velocity + 1] = (x[VX] * px + x[VY] * py) / _SPEED_MPS
-    row[_OWN.velocity + 2] = x[VZ] / _CLIMB_MPS
-    row[_OWN.tilt] = (-x[THETA] * ex + x[PHI] * ey) / _TILT_RAD
-    row[_OWN.tilt + 1] = (-x[THETA] * px + x[PHI] * py) / _TILT_RAD
+    row[_OWN.velocity] = (x[S.VX] * ex + x[S.VY] * ey) / _SPEED_MPS
+    row[_OWN.velocity + 1] = (x[S.VX] * px + x[S.VY] * py) / _SPEED_MPS
+    row[_OWN.velocity + 2] = x[S.VZ] / _CLIMB_MPS
+    row[_OWN.tilt] = (-x[S.THETA] * ex + x[S.PHI] * ey) / _TILT_RAD
+    row[_OWN.tilt + 1] = (-x[S.THETA] * px + x[S.PHI] * py) / _TILT_RAD
     row[_OWN.reference] = (reference[0] * ex + reference[1] * ey) / _SPEED_MPS
     row[_OWN.reference + 1] = (reference[0] * px + reference[1] * py) / _SPEED_MPS
     row[_OWN.closeness] = _NEAR_M / (_NEAR_M + way_m)
-    bx, by, bz = x[X], x[Y], x[Z]
+    bx, by, bz = x[S.X], x[S.Y], x[S.Z]
     for k in range(_PLACES):
         at = _FIRST_PLACE + k * _WIDTH
         dx, dy = aims_m[k, 0] - bx, aims_m[k, 1] - by
@@ -221,11 +221,11 @@ def observe_route(arena, i, x, reference, targets, n_targets, row, frame):
         bx, by, bz = aims_m[k, 0], aims_m[k, 1], aims_m[k, 2]
     at = _FIRST_AROUND
     _cast_rays(arena, x, ex, ey, side, _AHEAD_RAD, row[at + _AROUND.ahead :])
-    speed = math.hypot(x[VX], x[VY])
+    speed = math.hypot(x[S.VX], x[S.VY])
     if speed > _STILL_MPS:
-        ex, ey = x[VX] / speed, x[VY] / speed
+        ex, ey = x[S.VX] / speed, x[S.VY] / speed
     _cast_rays(arena, x, ex, ey, side, _FLIGHT_RAD, row[at + _AROUND.flight :])
-    row[at + _AROUND.rise] = (floor_m + x[Z]) / _RISE_M
+    row[at + _AROUND.rise] = (floor_m + x[S.Z]) / _RISE_M
     row[at + _AROUND.pace] = min(1.0, speed_mps / arena.uas[i].speed_mps)
     _observe_braking(
         arena, i, x, reference, reference[0], reference[1], aimed_m, _BRAKED_AFTER,

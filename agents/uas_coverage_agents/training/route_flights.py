@@ -23,7 +23,8 @@ from uas_coverage_agents.training.route_labels import Label, town_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import fly_kinematics
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import COMMAND_DTYPE, build_arena
 
 MOST_STEPS = 900
@@ -59,7 +60,7 @@ def _places_ahead(places, covered, ahead):
 def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, notes):
     """Fly a route; (steps, covered). Writes what the network reads to `rows`, and `notes`."""
     n = places.shape[0] - 1
-    x, reference, u = np.zeros(N_STATES), np.zeros(2), np.zeros(N_INPUTS)
+    x, reference, u = np.zeros(S.N_STATES), np.zeros(2), np.zeros(S.N_INPUTS)
     x[:3] = uas.home_m
     command = np.zeros(1, COMMAND_DTYPE)[0]
     ahead, aims_m = np.empty((AHEAD, 5)), np.empty((AHEAD, 3))
@@ -68,7 +69,7 @@ def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, notes):
     for step in range(notes.shape[0]):
         while covered < n:
             at = places[covered]
-            dx, dy, dz = x[X] - at[NORTH], x[Y] - at[EAST], x[Z] - at[DOWN]
+            dx, dy, dz = x[S.X] - at[NORTH], x[S.Y] - at[EAST], x[S.Z] - at[DOWN]
             if dx * dx + dy * dy + dz * dz > at[RADIUS] * at[RADIUS]:
                 break
             covered += 1

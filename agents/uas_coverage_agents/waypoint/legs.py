@@ -11,8 +11,11 @@ from uas_coverage_env.autopilot import seconds_home
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.planning.reserves import LEARNED_LEG, LEARNED_RETURN
-from uas_coverage_env.vehicle import N_STATES, X, Y, Z
-from uas_coverage_env.vehicle.range import SpeedLimits, flight_seconds
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.range import (
+    SpeedLimits,
+    flight_seconds,
+)
 from uas_coverage_env.world import Arena, route
 from uas_coverage_env.world.arena import ARENA
 
@@ -83,7 +86,7 @@ def _unit_m(waypoints):
 def _fill(arena, between_s, home_s, return_s, unit):
     waypoints = arena.waypoints
     n = waypoints.shape[0]
-    there = np.zeros(N_STATES)
+    there = np.zeros(S.N_STATES)
     slowest = 0
     for i in range(arena.uas.shape[0]):
         if arena.uas[i].speed_mps < arena.uas[slowest].speed_mps:
@@ -93,7 +96,7 @@ def _fill(arena, between_s, home_s, return_s, unit):
     unit[1] = unit[0] / (CRUISE_SHARE * uas.speed_mps)
     for a in range(n):
         here_m = waypoints[a].position_m
-        there[X], there[Y], there[Z] = here_m[0], here_m[1], here_m[2]
+        there[S.X], there[S.Y], there[S.Z] = here_m[0], here_m[1], here_m[2]
         for b in range(a + 1, n):
             there_m = waypoints[b].position_m
             way_m = math.hypot(there_m[0] - here_m[0], there_m[1] - here_m[1])

@@ -23,7 +23,7 @@ from uas_coverage_agents.waypoint.legs import home_leg_s, leg_s
 from uas_coverage_env.autopilot import path_length_home_m
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.planning.reserves import LEARNED_CLOCK_RESERVE
-from uas_coverage_env.vehicle import DOD, VX, VY, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import FLYING, HOME, route
 
 NO_TARGET = -2
@@ -76,7 +76,7 @@ def budget_s(arena, state, i):
     """Flying time [s] that battery and clock still allow."""
     uas = arena.uas[i]
     rules = arena.rules[0]
-    battery_s = (uas.dod_max - state.x[i, DOD]) / uas.dod_per_s
+    battery_s = (uas.dod_max - state.x[i, S.DOD]) / uas.dod_per_s
     clock_s = (rules.max_steps - state.step[0]) * rules.dt_s - LEARNED_CLOCK_RESERVE.kept_s
     return min(battery_s, clock_s)
 
@@ -95,7 +95,7 @@ def _nearest_by_way(arena, state, i, may, candidates, way_m, towards):
         straight_m[w] = math.inf
         if may[w]:
             position_m = arena.waypoints[w].position_m
-            straight_m[w] = math.hypot(position_m[0] - x[X], position_m[1] - x[Y])
+            straight_m[w] = math.hypot(position_m[0] - x[S.X], position_m[1] - x[S.Y])
     n = 0
     while True:
         w = straight_m.argmin()
@@ -104,7 +104,7 @@ def _nearest_by_way(arena, state, i, may, candidates, way_m, towards):
         straight_m[w] = math.inf
         position_m = arena.waypoints[w].position_m
         end_x, end_y, length_m, _ = route(
-            arena, w, x[X], x[Y], x[Z], position_m[0], position_m[1], position_m[2]
+            arena, w, x[S.X], x[S.Y], x[S.Z], position_m[0], position_m[1], position_m[2]
         )
         if n == K and length_m >= way_m[K - 1]:
             continue
@@ -117,8 +117,8 @@ def _nearest_by_way(arena, state, i, may, candidates, way_m, towards):
             at -= 1
         way_m[at] = length_m
         candidates[at] = w
-        towards[at, 0] = end_x - x[X]
-        towards[at, 1] = end_y - x[Y]
+        towards[at, 0] = end_x - x[S.X]
+        towards[at, 1] = end_y - x[S.Y]
 
 
 @allocating_kernel
@@ -141,7 +141,7 @@ def _team(arena, legs, state, targets, from_s, here_home_s, budgets_s, ready_s, 
         x = state.x[j]
         uas = arena.uas[j]
         way_m = path_length_home_m(arena, j, x)
-        here_home_s[j] = home_leg_s(uas, way_m, max(uas.home_m[2] - x[Z], 0.0))
+        here_home_s[j] = home_leg_s(uas, way_m, max(uas.home_m[2] - x[S.Z], 0.0))
         budgets_s[j] = budget_s(arena, state, j)
         if not covers(state, targets, j):
             ready_s[j] = here_home_s[j]
@@ -149,16 +149,16 @@ def _team(arena, legs, state, targets, from_s, here_home_s, budgets_s, ready_s, 
         w = targets[j]
         if w >= 0 and state.uncovered[w]:
             to_m = arena.waypoints[w].position_m
-            way_m = route(arena, w, x[X], x[Y], x[Z], to_m[0], to_m[1], to_m[2])[2]
-            ready_s[j] = leg_s(uas, way_m, x[Z] - to_m[2], arena.waypoints[w].radius_m)
+            way_m = route(arena, w, x[S.X], x[S.Y], x[S.Z], to_m[0], to_m[1], to_m[2])[2]
+            ready_s[j] = leg_s(uas, way_m, x[S.Z] - to_m[2], arena.waypoints[w].radius_m)
             place[j] = w
             continue
         place[j] = IN_THE_AIR
         for w in range(state.uncovered.shape[0]):
             if state.uncovered[w]:
                 to_m = arena.waypoints[w].position_m
-                way_m = math.hypot(to_m[0] - x[X], to_m[1] - x[Y])
-                from_s[j, w] = leg_s(uas, way_m, x[Z] - to_m[2], arena.waypoints[w].radius_m)
+                way_m = math.hypot(to_m[0] - x[S.X], to_m[1] - x[S.Y])
+                from_s[j, w] = leg_s(uas, way_m, x[S.Z] - to_m[2], arena.waypoints[w].radius_m)
 
 
 @allocating_kernel
@@ -245,8 +245,8 @@ def observe(arena, legs, state, blocked, targets, i, candidates, legal, row):
         else:
             w = candidates[k]
             waypoint = arena.waypoints[w]
-            flying_s = leg_s(uas, way_m[k], x[Z] - waypoint.position_m[2], waypoint.radius_m)
-            turning_s = _turning_s(cruise_mps, x[VX], x[VY], towards[k])
+            flying_s = leg_s(uas, way_m[k], x[S.Z] - waypoint.position_m[2], waypoint.radius_m)
+            turning_s = _turning_s(cruise_mps, x[S.VX], x[S.VY], towards[k])
             to_spare_s = budgets_s[i] - flying_s - legs.return_s[i, w]
             legal[k] = to_spare_s > 0.0
             n_legal += legal[k]
@@ -275,9 +275,9 @@ def observe(arena, legs, state, blocked, targets, i, candidates, legal, row):
             values[CANDIDATE_AT.outside] = math.hypot(
                 waypoint.position_m[0] - centre_x, waypoint.position_m[1] - centre_y
             )
-            speed_mps = math.hypot(x[VX], x[VY])
+            speed_mps = math.hypot(x[S.VX], x[S.VY])
             length_m = math.hypot(towards[k, 0], towards[k, 1])
-            along = x[VX] * towards[k, 0] + x[VY] * towards[k, 1]
+            along = x[S.VX] * towards[k, 0] + x[S.VY] * towards[k, 1]
             values[CANDIDATE_AT.ahead] = along / max(speed_mps * length_m, 1e-6)
         total_s[k], longest_s[k], left[k] = greedy_rollout(
             legs, from_s, here_home_s, budgets_s, trial_ready_s, trial_place, trial_todo, n_trial
@@ -307,11 +307,11 @@ def observe(arena, legs, state, blocked, targets, i, candidates, legal, row):
             continue
         n_mates += 1
         mates_s = min(mates_s, budgets_s[j] - here_home_s[j])
-        mate_m = min(mate_m, math.hypot(state.x[j, X] - x[X], state.x[j, Y] - x[Y]))
+        mate_m = min(mate_m, math.hypot(state.x[j, S.X] - x[S.X], state.x[j, S.Y] - x[S.Y]))
     # no UAS leaves waypoints behind that the others are not expected to finish
     legal[HOME_CHOICE] = n_legal == 0 or (n_mates > 0 and left[K] <= left[best])
     n_legal += legal[HOME_CHOICE]
-    team[TEAM_AT.speed] = math.hypot(x[VX], x[VY]) / uas.speed_mps
+    team[TEAM_AT.speed] = math.hypot(x[S.VX], x[S.VY]) / uas.speed_mps
     team[TEAM_AT.way_home] = here_home_s[i]
     team[TEAM_AT.margin] = budgets_s[i] - here_home_s[i]
     team[TEAM_AT.time_left] = (arena.rules[0].max_steps - state.step[0]) * arena.rules[0].dt_s
@@ -335,7 +335,7 @@ def observe(arena, legs, state, blocked, targets, i, candidates, legal, row):
             position_m = arena.waypoints[w].position_m
             spread_m += math.hypot(position_m[0] - centre_x, position_m[1] - centre_y)
     team[TEAM_AT.spread] = spread_m / max(n_open, 1)
-    team[TEAM_AT.centre] = math.hypot(x[X] - centre_x, x[Y] - centre_y)
+    team[TEAM_AT.centre] = math.hypot(x[S.X] - centre_x, x[S.Y] - centre_y)
     _scale(TEAM_TABLE, legs.unit, team, row[:N_TEAM])
     for k in range(n_candidates):
         first = N_TEAM + k * N_CANDIDATE

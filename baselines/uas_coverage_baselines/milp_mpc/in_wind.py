@@ -29,17 +29,8 @@ from scipy.linalg import solve_discrete_are
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.mission import LearntWind, MissionBrief
 from uas_coverage_env.mission.learnt_wind import axes
-from uas_coverage_env.vehicle import (
-    LIFT,
-    PHI,
-    TAU_X,
-    TAU_Y,
-    THETA,
-    VZ,
-    LinearModel,
-    VehicleParams,
-    Z,
-)
+from uas_coverage_env.vehicle import LinearModel, VehicleParams
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.world import Mode, SwarmState, Velocity
@@ -48,7 +39,7 @@ FloatArray = NDArray[np.float64]
 
 _HOLDING_COST = 10.0
 # of the angular acceleration north and east
-_TORQUES = ((TAU_Y, -1.0, 1), (TAU_X, 1.0, 0))
+_TORQUES = ((S.TAU_Y, -1.0, 1), (S.TAU_X, 1.0, 0))
 
 
 @lru_cache(maxsize=64)
@@ -64,8 +55,8 @@ def position_gain(vehicle: VehicleParams, dt_s: float) -> FloatArray:
 def climb_gain(vehicle: VehicleParams, dt_s: float) -> FloatArray:
     """(2,) [N/m, N s/m] of height and climb, for the lift; a metre weighs as much as 3 m/s²."""
     A, B = taylor(*rigid_body(vehicle), dt_s, ORDER)
-    own = [Z, VZ]
-    return _regulator(A[np.ix_(own, own)], B[own, LIFT], 0.1 / vehicle.airframe.mass_kg**2)
+    own = [S.Z, S.VZ]
+    return _regulator(A[np.ix_(own, own)], B[own, S.LIFT], 0.1 / vehicle.airframe.mass_kg**2)
 
 
 def _regulator(A: FloatArray, B: FloatArray, cost: float) -> FloatArray:
@@ -104,8 +95,8 @@ class InWind:
         x = swarm.x.copy()
         for i, vehicle in enumerate(self._vehicles):
             lean_rad = vehicle.trim_tilt_rad_per_mps * self.wind_mps[i]
-            x[i, THETA] -= lean_rad[0]
-            x[i, PHI] += lean_rad[1]
+            x[i, S.THETA] -= lean_rad[0]
+            x[i, S.PHI] += lean_rad[1]
         return replace(swarm, x=x)
 
     def from_here(self, plan: Plan | None, problem: PlanningProblem) -> Plan | None:
@@ -131,7 +122,7 @@ class InWind:
                 most_Nm = vehicle.torque_max_Nm[axis]
                 u[k, torque] += sign * vehicle.airframe.inertia_kgm2[axis] * alpha
                 u[k, torque] = min(max(u[k, torque], -most_Nm), most_Nm)
-            u[k, LIFT] -= climb @ off[[Z, VZ]]
+            u[k, S.LIFT] -= climb @ off[[S.Z, S.VZ]]
             off = model.A @ off + model.B @ (u[k] - planned)
         x[len(u)] += off
 
@@ -159,7 +150,9 @@ class InWind:
             asked = alpha + state[:, 1:] @ k
             velocity_mps = asked / (k[0] + k[1] * vehicle.trim_tilt_rad_per_mps)
             north_mps, east_mps = self._within(i, velocity_mps)
-            result[name] = Velocity(north_mps, east_mps, -float(plan.x[row, 1, Z]), mode=mode(name))
+            result[name] = Velocity(
+                north_mps, east_mps, -float(plan.x[row, 1, S.Z]), mode=mode(name)
+            )
         return result
 
     def _within(self, i: int, velocity_mps: FloatArray) -> tuple[float, float]:

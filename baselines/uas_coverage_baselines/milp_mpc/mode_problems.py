@@ -20,7 +20,7 @@ from uas_coverage_baselines.milp_mpc.options import ModeOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.return_rule import ReturnRule
 from uas_coverage_env.mission import MissionBrief, Ways
-from uas_coverage_env.vehicle import DOD, VX, VZ
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import HOME, Mode, SwarmState
 
 _FARTHEST = 4.0  # horizons of cruising: with a metre's cost as low as this a UAS still sets off
@@ -88,12 +88,12 @@ class ModeProblems:
 
     def _situation(self, swarm: SwarmState, name: str, planned: set[int] | None) -> Situation:
         x, rule = swarm.x[swarm.names.index(name)], self._return_rule
-        beyond = rule.beyond(name, x[0:3], float(x[DOD]), swarm.uncovered)
+        beyond = rule.beyond(name, x[0:3], float(x[S.DOD]), swarm.uncovered)
         self._beyond[name] = frozenset(beyond)
         return Situation(
             position_m=x[0:3],
-            velocity_mps=x[VX : VZ + 1],
-            dod=float(x[DOD]),
+            velocity_mps=x[S.VX : S.VZ + 1],
+            dod=float(x[S.DOD]),
             dod_return=rule.dod_return(name, x[0:3], swarm.uncovered),
             uncovered=swarm.uncovered,
             plans_coverage=planned is None or bool(planned),

@@ -27,14 +27,8 @@ from uas_coverage_baselines.milp_mpc.options import OcpOptions
 from uas_coverage_env.geometry import inner_factor
 from uas_coverage_env.mission import MissionBrief, Way, Ways, WorldView
 from uas_coverage_env.scenario import Uas
-from uas_coverage_env.vehicle import (
-    DOD,
-    VX,
-    VY,
-    VehicleParams,
-    dod_per_s,
-    linear_model,
-)
+from uas_coverage_env.vehicle import VehicleParams, dod_per_s, linear_model
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import HOME, SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -191,14 +185,14 @@ class ProblemBuilder:
         moving = np.array([o.safe_distance_m for o in self.brief.moving_obstacles])
         vehicles = tuple(self._vehicles[name] for name in names)
         ways_home = tuple(
-            self._way_home(name, self.way(name, HOME, x[:3], float(np.hypot(x[VX], x[VY]))))
+            self._way_home(name, self.way(name, HOME, x[:3], float(np.hypot(x[S.VX], x[S.VY]))))
             for name, x in zip(names, x0, strict=True)
         )
         return PlanningProblem(
             names=names,
             vehicles=vehicles,
             models=tuple(
-                linear_model(vehicle, float(x[DOD]), self.dt_s, order)
+                linear_model(vehicle, float(x[S.DOD]), self.dt_s, order)
                 for vehicle, x in zip(vehicles, x0, strict=True)
             ),
             x0=x0,
@@ -220,7 +214,7 @@ class ProblemBuilder:
             waypoint_index=waypoints,
             n_scenario_waypoints=len(self.waypoints_m),
             home_m=np.array([self.home_m[name] for name in names]),
-            dod_max=self._dod_max(uas, x0[:, DOD]),
+            dod_max=self._dod_max(uas, x0[:, S.DOD]),
             targets=(None,) * len(names),
             ways_home=ways_home if any(ways_home) else (),
             dt_s=self.dt_s,

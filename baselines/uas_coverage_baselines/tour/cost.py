@@ -16,7 +16,7 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.state import WIND
 from uas_coverage_env.geometry import cylinder_clearance, segment_meets, signed_distance
 from uas_coverage_env.planning.reserves import ROUTED
-from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import SpeedLimits, flight_seconds
 from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart, route
@@ -64,19 +64,19 @@ def distances_kept(arena, i, x, others_m):
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         now_m = signed_distance(
-            normals, offsets_m, obstacle.first_kept, obstacle.last_kept, x[X], x[Y], x[Z]
+            normals, offsets_m, obstacle.first_kept, obstacle.last_kept, x[S.X], x[S.Y], x[S.Z]
         )
         keep_m[o] = min(arena.uas[i].radius_m + obstacle.safe_distance_m + _MARGIN_M, now_m - 1e-3)
     fence_m = np.empty(rules.fence_last - rules.fence_first)
     for h in range(len(fence_m)):
         face = rules.fence_first + h
-        now_m = -signed_distance(normals, offsets_m, face, face + 1, x[X], x[Y], x[Z])
+        now_m = -signed_distance(normals, offsets_m, face, face + 1, x[S.X], x[S.Y], x[S.Z])
         fence_m[h] = min(rules.fence_margin_m + 0.5 * _MARGIN_M, now_m - 1e-3)
     height_m = -math.inf
     if rules.min_height_m > 0.0:
         height_m = rules.min_height_m + 0.5 * _MARGIN_M
-        if not in_landing_zone(arena, i, x[X], x[Y]):
-            height_m = min(height_m, -x[Z] - 1e-3)
+        if not in_landing_zone(arena, i, x[S.X], x[S.Y]):
+            height_m = min(height_m, -x[S.Z] - 1e-3)
     path_m = np.empty((rules.lookahead_steps + 1, 3))
     return Around(keep_m, fence_m, height_m, others_m, path_m)
 
@@ -106,8 +106,8 @@ def _has_landed(arena, i, task, x, covered):
     if covered < len(task.route):
         return False
     rules, home_m = arena.rules[0], arena.uas[i].home_m
-    dx, dy, dz = x[X] - home_m[0], x[Y] - home_m[1], x[Z] - home_m[2]
-    speed_mps = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY] + x[VZ] * x[VZ])
+    dx, dy, dz = x[S.X] - home_m[0], x[S.Y] - home_m[1], x[S.Z] - home_m[2]
+    speed_mps = math.sqrt(x[S.VX] * x[S.VX] + x[S.VY] * x[S.VY] + x[S.VZ] * x[S.VZ])
     near = math.sqrt(dx * dx + dy * dy + dz * dz) < 0.9 * rules.landing_distance_m
     return near and speed_mps < 0.9 * rules.landing_speed_mps
 
@@ -119,11 +119,11 @@ def _seconds_to(arena, i, task, x, covered, belief):
     heads_home = covered == len(task.route)
     target = HOME_TARGET if heads_home else task.route[covered]
     row, x1, y1, z1 = target_position(arena, i, target)
-    corner_x, corner_y, way_m, _ = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
+    corner_x, corner_y, way_m, _ = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
     near_m = task.near_m[covered]
     left_m = max(way_m - near_m, 0.0)
-    up_m, down_m = max(x[Z] - z1 - near_m, 0.0), max(z1 - x[Z] - near_m, 0.0)
-    dx, dy = corner_x - x[X], corner_y - x[Y]
+    up_m, down_m = max(x[S.Z] - z1 - near_m, 0.0), max(z1 - x[S.Z] - near_m, 0.0)
+    dx, dy = corner_x - x[S.X], corner_y - x[S.Y]
     length_m = math.hypot(dx, dy) + 1e-9
     speed_mps = uas.speed_mps
     if belief is not None:
@@ -139,7 +139,7 @@ def _seconds_to(arena, i, task, x, covered, belief):
     if heads_home or task.cover_m[covered] < 0.0:
         wanted_mps = min(wanted_mps, math.sqrt(2.0 * task.acceleration_mps2 * left_m))
         seconds += 0.5 * wanted_mps / task.acceleration_mps2
-    dvx, dvy = x[VX] - wanted_mps * dx / length_m, x[VY] - wanted_mps * dy / length_m
+    dvx, dvy = x[S.VX] - wanted_mps * dx / length_m, x[S.VY] - wanted_mps * dy / length_m
     seconds += (dvx * dvx + dvy * dvy) / (2.0 * task.acceleration_mps2 * uas.speed_mps)
     return seconds
 
@@ -181,7 +181,7 @@ def cost_s(arena, i, task, plan, first, around, command, limit_s, belief=None):
         if k >= first:
             fly_step(arena, i, task, plan, k, command, belief)
             a, x = plan.path_m[k], plan.x[k + 1]
-            clear = _is_clear(arena, i, around, a[0], a[1], a[2], x[X], x[Y], x[Z])
+            clear = _is_clear(arena, i, around, a[0], a[1], a[2], x[S.X], x[S.Y], x[S.Z])
             if clear and k < _EXACT_STEPS:
                 n_braking, slack_m = fly_and_brake(
                     arena, i, plan.x[k], plan.reference[k], command, False, around.path_m, belief
@@ -189,8 +189,8 @@ def cost_s(arena, i, task, plan, first, around, command, limit_s, belief=None):
                 clear = fixed_slack(arena, i, around.path_m, n_braking, 0.0, slack_m) >= 0.0
             elif clear:
                 clear = _is_clear(
-                    arena, i, around, x[X], x[Y], x[Z], x[X] + task.brake_s * x[VX],
-                    x[Y] + task.brake_s * x[VY], x[Z] + 0.5 * dt_s * x[VZ],
+                    arena, i, around, x[S.X], x[S.Y], x[S.Z], x[S.X] + task.brake_s * x[S.VX],
+                    x[S.Y] + task.brake_s * x[S.VY], x[S.Z] + 0.5 * dt_s * x[S.VZ],
                 )  # fmt: skip
             if not clear:
                 cost = _UNFLYABLE_S * (2.0 - k / n_steps)

@@ -30,7 +30,7 @@ from uas_coverage_env.mission import (
     in_disturbances,
     without,
 )
-from uas_coverage_env.vehicle import VX, VY, VZ
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     FLYING,
@@ -281,10 +281,10 @@ class Tour:
     def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64], swarm: SwarmState) -> int:
         """Move what is left of the plan one step on; how many of its legs still hold."""
         plan = self._plans[i]
-        off_mps = float(np.abs((plan.x[1] - x)[VX : VZ + 1]).max())
+        off_mps = float(np.abs((plan.x[1] - x)[S.VX : S.VZ + 1]).max())
         if self._learnt is None:
             as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
-            plan.reference[0] = plan.reference[1] if as_planned else x[VX : VY + 1]
+            plan.reference[0] = plan.reference[1] if as_planned else x[S.VX : S.VY + 1]
         else:
             filtered = len(swarm.filtered) > 0 and swarm.filtered[i]
             as_planned = self._is_flown[i] and not filtered and not swarm.returning[i]

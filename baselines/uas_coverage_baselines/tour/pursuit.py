@@ -19,7 +19,8 @@ from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_kinematicall
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import CLIMB, VELOCITY
 from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES, VX, VY, VZ, X, Y, Z, fly_kinematics
+from uas_coverage_env.vehicle import fly_kinematics
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import CLEAR, box_apart, crossing, route
 
@@ -96,7 +97,7 @@ def empty_plan(n_steps: int) -> PursuitPlan:
         np.ones(n_steps),
         np.zeros((n_steps, 3)),
         np.zeros((n_steps, 3)),
-        np.zeros((n_steps + 1, N_STATES)),
+        np.zeros((n_steps + 1, S.N_STATES)),
         np.zeros((n_steps + 1, 2)),
         np.zeros(n_steps + 1, np.int64),
         np.zeros(n_steps + 1, np.int64),
@@ -107,7 +108,7 @@ def empty_plan(n_steps: int) -> PursuitPlan:
 @allocating_kernel
 def brake_seconds(arena, i, command):
     """How far braking leads ahead from the highest speed, over that speed [s]."""
-    x, reference, u = np.zeros(N_STATES), np.zeros(2), np.zeros(N_INPUTS)
+    x, reference, u = np.zeros(S.N_STATES), np.zeros(2), np.zeros(S.N_INPUTS)
     speed_mps, steps = arena.uas[i].speed_mps, arena.rules[0].lookahead_steps
     write_command(command, CLIMB, speed_mps, 0.0, 0.0)
     for _ in range(2 * steps):
@@ -115,7 +116,7 @@ def brake_seconds(arena, i, command):
         fly_kinematics(arena.vehicles[i], x, u)
     path_m = np.empty((steps + 1, 3))
     fly_and_brake(arena, i, x, reference, arena.rules[0].brake, False, path_m)
-    return (path_m[:, 0].max() - x[X]) / speed_mps
+    return (path_m[:, 0].max() - x[S.X]) / speed_mps
 
 
 @allocating_kernel
@@ -131,10 +132,10 @@ def begin(plan, x, reference):
 @allocating_kernel
 def _is_as_asked(waypoint, x):
     """Whether height and speed are those that a waypoint asks for, with some to spare."""
-    speed_mps = math.sqrt(x[VX] * x[VX] + x[VY] * x[VY] + x[VZ] * x[VZ])
+    speed_mps = math.sqrt(x[S.VX] * x[S.VX] + x[S.VY] * x[S.VY] + x[S.VZ] * x[S.VZ])
     spare_m = min(_HEIGHT_SPARE_M, 0.25 * (waypoint.highest_m - waypoint.lowest_m))
     return (
-        waypoint.lowest_m + spare_m <= -x[Z] <= waypoint.highest_m - spare_m
+        waypoint.lowest_m + spare_m <= -x[S.Z] <= waypoint.highest_m - spare_m
         and speed_mps <= _SPEED_SHARE * waypoint.max_speed_mps
     )
 
@@ -145,15 +146,15 @@ def _write_step(arena, i, task, plan, k, command, belief):
     x, reference = plan.x[k + 1], plan.reference[k + 1]
     x[:] = plan.x[k]
     reference[:] = plan.reference[k]
-    fly_kinematically(arena.vehicles[i], x, reference, command, np.zeros(N_INPUTS), belief)
-    plan.path_m[k + 1, 0] = x[X]
-    plan.path_m[k + 1, 1] = x[Y]
-    plan.path_m[k + 1, 2] = x[Z]
+    fly_kinematically(arena.vehicles[i], x, reference, command, np.zeros(S.N_INPUTS), belief)
+    plan.path_m[k + 1, 0] = x[S.X]
+    plan.path_m[k + 1, 1] = x[S.Y]
+    plan.path_m[k + 1, 2] = x[S.Z]
     done = plan.covered[k]
     while done < len(task.route):
         waypoint = arena.waypoints[task.route[done]]
         at_m = waypoint.position_m
-        dx, dy, dz = x[X] - at_m[0], x[Y] - at_m[1], x[Z] - at_m[2]
+        dx, dy, dz = x[S.X] - at_m[0], x[S.Y] - at_m[1], x[S.Z] - at_m[2]
         if math.sqrt(dx * dx + dy * dy + dz * dz) > task.cover_m[done]:
             break
         if waypoint.asks and not _is_as_asked(waypoint, x):
@@ -163,7 +164,7 @@ def _write_step(arena, i, task, plan, k, command, belief):
     leg = max(plan.leg[k], done)
     if leg == plan.leg[k] and leg < min(len(task.route), LEGS):
         aim_m = plan.aim_m[leg]
-        if math.hypot(x[X] - aim_m[0], x[Y] - aim_m[1]) < plan.early_m[leg]:
+        if math.hypot(x[S.X] - aim_m[0], x[S.Y] - aim_m[1]) < plan.early_m[leg]:
             leg += 1
     plan.leg[k + 1] = leg
 
@@ -172,14 +173,14 @@ def _write_step(arena, i, task, plan, k, command, belief):
 def _roofs_ahead(arena, i, x, x1, y1):
     """Altitude that low obstacles on a leg ask for, and the speed that leaves time to climb."""
     needed_m, speed_mps = -math.inf, arena.uas[i].speed_mps
-    length_m = math.hypot(x1 - x[X], y1 - x[Y])
+    length_m = math.hypot(x1 - x[S.X], y1 - x[S.Y])
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
-        at, over, _ = crossing(obstacle, arena.normals, arena.offsets_m, x[X], x[Y], x1, y1)
+        at, over, _ = crossing(obstacle, arena.normals, arena.offsets_m, x[S.X], x[S.Y], x1, y1)
         if at > 1.0 or (obstacle.tall and not over):
             continue
         needed_m = max(needed_m, obstacle.roof_m)
-        rise_m = obstacle.roof_m + x[Z]
+        rise_m = obstacle.roof_m + x[S.Z]
         if rise_m > 0.0:
             speed_mps = min(speed_mps, at * length_m / (rise_m / arena.uas[i].climb_mps + _LAG_S))
     return needed_m, speed_mps
@@ -194,30 +195,30 @@ def _pursue(arena, i, task, plan, k):
     speed_mps = uas.speed_mps
     if target >= 0 and leg < LEGS:
         x1, y1, z1 = plan.aim_m[leg, 0], plan.aim_m[leg, 1], plan.aim_m[leg, 2]
-    end_x, end_y, way_m, kind = route(arena, row, x[X], x[Y], x[Z], x1, y1, z1)
+    end_x, end_y, way_m, kind = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
     altitude_m = -z1
     lead_s = 0.0
     if target >= 0 and arena.waypoints[target].max_speed_mps < speed_mps:
         slow_mps = _SLOW_SHARE * arena.waypoints[target].max_speed_mps
         left_m = way_m - _SLOW_WITHIN * arena.waypoints[target].radius_m
-        left_m = max(left_m - _LAG_S * math.hypot(x[VX], x[VY]), 0.0)
+        left_m = max(left_m - _LAG_S * math.hypot(x[S.VX], x[S.VY]), 0.0)
         braking_mps2 = 2.0 * _SLOW_BRAKING * task.acceleration_mps2
         speed_mps = min(speed_mps, math.sqrt(slow_mps * slow_mps + braking_mps2 * left_m))
     if target == HOME_TARGET or task.cover_m[leg] < 0.0:
         left_m = max(way_m - (task.near_m[leg] if target >= 0 else 0.0), 0.0)
-        lead_s = min(_LAG_S, left_m / (2.0 * math.hypot(x[VX], x[VY]) + 1e-9))
-        left_m = max(left_m - lead_s * math.hypot(x[VX], x[VY]), 0.0)
+        lead_s = min(_LAG_S, left_m / (2.0 * math.hypot(x[S.VX], x[S.VY]) + 1e-9))
+        left_m = max(left_m - lead_s * math.hypot(x[S.VX], x[S.VY]), 0.0)
         speed_mps = min(speed_mps, math.sqrt(task.acceleration_mps2 * left_m), 0.5 * left_m)
         if target == HOME_TARGET:
             altitude_m += uas.descent_mps * max(way_m / uas.speed_mps - 1.0, 0.0)
-            altitude_m = min(altitude_m, max(-x[Z], rules.floor_m + CRUISE_ALTITUDE_M))
+            altitude_m = min(altitude_m, max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M))
     if kind != CLEAR:
         needed_m, slow_mps = _roofs_ahead(arena, i, x, end_x, end_y)
         altitude_m = max(altitude_m, needed_m)
         speed_mps = min(speed_mps, slow_mps)
-    dx, dy = end_x - x[X] - lead_s * x[VX], end_y - x[Y] - lead_s * x[VY]
+    dx, dy = end_x - x[S.X] - lead_s * x[S.VX], end_y - x[S.Y] - lead_s * x[S.VY]
     share = plan.share[k] * speed_mps / (math.hypot(dx, dy) + 1e-9)
-    floor_m = lowest_altitude(arena, i, x[X], x[Y])
+    floor_m = lowest_altitude(arena, i, x[S.X], x[S.Y])
     altitude_m = min(max(altitude_m, floor_m), max(rules.ceiling_m, -z1))
     _write_pushed(arena, i, plan, k, share * dx, share * dy, altitude_m)
 
@@ -231,7 +232,7 @@ def _write_pushed(arena, i, plan, k, north_mps, east_mps, altitude_m):
     share = min(1.0, arena.uas[i].speed_mps / (math.hypot(north_mps, east_mps) + 1e-9))
     plan.commands[k, 0] = share * north_mps
     plan.commands[k, 1] = share * east_mps
-    floor_m = lowest_altitude(arena, i, x[X], x[Y])
+    floor_m = lowest_altitude(arena, i, x[S.X], x[S.Y])
     pushed_m = max(altitude_m + push[2], min(floor_m, altitude_m))
     plan.commands[k, 2] = min(pushed_m, max(rules.ceiling_m, altitude_m))
 
@@ -261,7 +262,7 @@ def push_to_guidance(arena, i, task, plan, command, belief=None):
             target = task.route[done]
             stop = task.cover_m[done] < 0.0 or arena.waypoints[target].asks
         guide(arena, i, x, plan.reference[k], target, stop, False, command, belief)
-        altitude_m = command.values[2] if command.kind == VELOCITY else -x[Z]
+        altitude_m = command.values[2] if command.kind == VELOCITY else -x[S.Z]
         plan.push[k, 0] = command.values[0] - plan.commands[k, 0]
         plan.push[k, 1] = command.values[1] - plan.commands[k, 1]
         plan.push[k, 2] = altitude_m - plan.commands[k, 2]

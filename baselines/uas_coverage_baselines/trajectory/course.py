@@ -16,11 +16,7 @@ from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.flight_model import excess, reduced_state, rollout
 from uas_coverage_baselines.trajectory.program import Flight
 from uas_coverage_baselines.trajectory.space import apart_m, spare_of_rules_m
-from uas_coverage_env.vehicle import (
-    DOD,
-    VX,
-    VZ,
-)
+from uas_coverage_env.vehicle import layout as S
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -62,7 +58,7 @@ class Course:
 
     def begins_at(self, x: FloatArray) -> bool:
         """Whether a UAS in this state (14,) flies what was planned; its battery is left out."""
-        return bool(np.abs(self.x[0, :DOD] - x[:DOD]).max() <= _AS_PLANNED)
+        return bool(np.abs(self.x[0, : S.DOD] - x[: S.DOD]).max() <= _AS_PLANNED)
 
     def path_m(self, steps: int) -> FloatArray:
         """(K+1, 3) positions, K at most `steps`; a hover is held, a UAS that has landed is gone."""
@@ -102,9 +98,9 @@ def trouble_alone(fleet: Fleet, uas: int, x: FloatArray, flight: Flight) -> str 
     landing = fleet.programs[uas].landing
     if np.linalg.norm(path_m[-1] - landing.home_m) > landing.distance_m:
         return "does not come home"
-    if np.linalg.norm(states[-1, VX : VZ + 1]) > landing.speed_mps:
+    if np.linalg.norm(states[-1, S.VX : S.VZ + 1]) > landing.speed_mps:
         return "does not land"
-    if states[-1, DOD] > float(fleet.brief.uas[uas].dod_max) - _DOD_RESERVE:
+    if states[-1, S.DOD] > float(fleet.brief.uas[uas].dod_max) - _DOD_RESERVE:
         return "the battery does not last"
     return None
 

@@ -14,24 +14,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.belief import GUSTS, VERTICAL_GUSTS
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import (
-    LIFT,
-    PHI,
-    TAU_X,
-    TAU_Y,
-    THETA,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WY,
-    X,
-    Y,
-    Z,
-    lpv_step,
-    velocity_climb_wrench,
-    write_limited,
-)
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle import lpv_step, velocity_climb_wrench, write_limited
 from uas_coverage_env.vehicle.limits import N_LIMITS
 
 FloatArray = NDArray[np.float64]
@@ -138,7 +122,19 @@ def in_wind(model: FlightModel, wind_mps: FloatArray) -> FlightModel:
 def reduced_state(x: FloatArray) -> FloatArray:
     """(10,) of the program, of a state (14,)."""
     return np.array(
-        [x[X], x[VX], -x[THETA], -x[WY], x[Y], x[VY], x[PHI], x[WX], x[Z], x[VZ]], np.float64
+        [
+            x[S.X],
+            x[S.VX],
+            -x[S.THETA],
+            -x[S.WY],
+            x[S.Y],
+            x[S.VY],
+            x[S.PHI],
+            x[S.WX],
+            x[S.Z],
+            x[S.VZ],
+        ],
+        np.float64,
     )
 
 
@@ -161,12 +157,12 @@ def rollout(vehicle, start, inputs):
     used = np.zeros(N_LIMITS)
     x[0] = start
     for n in range(n_steps):
-        reference[0], reference[1] = x[n, VX], x[n, VY]
+        reference[0], reference[1] = x[n, S.VX], x[n, S.VY]
         # the heading is held by the inner loop; lift and the other torques are the program's
-        velocity_climb_wrench(vehicle, x[n], reference, x[n, VX], x[n, VY], 0.0, u[n])
-        u[n, LIFT] = inputs[n, 2]
-        u[n, TAU_X] = inputs[n, 1] * vehicle.inertia_kgm2[0]
-        u[n, TAU_Y] = -inputs[n, 0] * vehicle.inertia_kgm2[1]
+        velocity_climb_wrench(vehicle, x[n], reference, x[n, S.VX], x[n, S.VY], 0.0, u[n])
+        u[n, S.LIFT] = inputs[n, 2]
+        u[n, S.TAU_X] = inputs[n, 1] * vehicle.inertia_kgm2[0]
+        u[n, S.TAU_Y] = -inputs[n, 0] * vehicle.inertia_kgm2[1]
         voltage, current = lpv_step(vehicle, x[n], u[n], x[n + 1])
         write_limited(x[n + 1], voltage, current, False, values)
         for k in range(N_LIMITS - 1):

@@ -38,7 +38,7 @@ from uas_coverage_env.mission import (
     first_sight,
     without,
 )
-from uas_coverage_env.vehicle import DELTA_THRUST, VX, VZ
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Wrench
 
 FloatArray = NDArray[np.float64]
@@ -234,14 +234,14 @@ class Trajectory:
             u_now = hover_inputs(self._fleet, u, swarm.x[u]) if hovers else course.u[0]
             flown[u] = u_now
             mode = "covering" if self._has_work(u, swarm) else "return"
-            commands[name] = Wrench(*(float(value) for value in u_now[:DELTA_THRUST]), mode=mode)
+            commands[name] = Wrench(*(float(value) for value in u_now[: S.DELTA_THRUST]), mode=mode)
             predicted_m[name] = course.path_m(max(len(course.u), 1))
         if rest:
             late = [u for u in rest if dt_s * (step - self._without_plan_since[u]) >= _HOME_AFTER_S]
             inputs = self._safeguard.evade(rest, flown, late)
             for u in rest:
                 self._safeguard.backups.pop(u, None)
-                wrench = (float(value) for value in inputs[u][:DELTA_THRUST])
+                wrench = (float(value) for value in inputs[u][: S.DELTA_THRUST])
                 mode = "return" if u in late else "covering"
                 commands[swarm.names[u]] = Wrench(*wrench, mode=mode)
         self.last_decision = Decision(predicted_m, fallback=fallback is not None, reason=fallback)
@@ -270,7 +270,7 @@ class Trajectory:
             if u not in self._flown_as_planned:  # nothing pushed it: it flew something else
                 del self._planned[u]
                 continue
-            off = rest.x[0, VX : VZ + 1] - swarm.x[u, VX : VZ + 1]
+            off = rest.x[0, S.VX : S.VZ + 1] - swarm.x[u, S.VX : S.VZ + 1]
             obeys = swarm.responds[u] and not filtered[u]  # else it flies something else
             self._failures.see(float(obeys * np.linalg.norm(off)))
             if not self._is_disturbed and not filtered[u]:

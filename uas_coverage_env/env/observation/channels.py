@@ -9,7 +9,7 @@ import math
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.observation.block import Feature, ObservationBlock
 from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.coverage import can_cover
 
@@ -82,8 +82,8 @@ def _write(arena, state, tables, learners, i, parameters, row):
     n = int(parameters[0])
     cell_m = parameters[1] / n
     x = state.x[i]
-    top_m = x[X] + 0.5 * parameters[1]
-    left_m = x[Y] - 0.5 * parameters[1]
+    top_m = x[S.X] + 0.5 * parameters[1]
+    left_m = x[S.Y] - 0.5 * parameters[1]
     for k in range(row.shape[0]):
         row[k] = 0.0
     for w in range(state.uncovered.shape[0]):
@@ -92,18 +92,18 @@ def _write(arena, state, tables, learners, i, parameters, row):
             r = _index(top_m - waypoint.position_m[0], cell_m, n)
             c = _index(waypoint.position_m[1] - left_m, cell_m, n)
             _mark(row, _OPEN, n, r, c, min(1.0, waypoint.weight * tables.scales[i].per_heaviest))
-    _block(arena, i, n, cell_m, top_m, left_m, x[Z], row)
+    _block(arena, i, n, cell_m, top_m, left_m, x[S.Z], row)
     for j in range(state.uas.shape[0]):
         if j != i and state.uas[j].status == FLYING:
-            r = _index(top_m - state.x[j, X], cell_m, n)
-            c = _index(state.x[j, Y] - left_m, cell_m, n)
+            r = _index(top_m - state.x[j, S.X], cell_m, n)
+            c = _index(state.x[j, S.Y] - left_m, cell_m, n)
             _mark(row, _OTHERS, n, r, c, 1.0)
     sample = min(state.step[0], arena.moving_path_m.shape[0] - 1)
     for m in range(arena.moving.shape[0]):
         centre_m = arena.moving_path_m[sample, m]
         body = arena.moving[m]
         beside_m = body.radius_m + arena.uas[i].radius_m + 0.5 * cell_m
-        level = abs(x[Z] - centre_m[2]) <= body.half_height_m + arena.uas[i].radius_m
+        level = abs(x[S.Z] - centre_m[2]) <= body.half_height_m + arena.uas[i].radius_m
         first_r = max(0, _index(top_m - centre_m[0] - beside_m, cell_m, n))
         last_r = min(n - 1, _index(top_m - centre_m[0] + beside_m, cell_m, n))
         first_c = max(0, _index(centre_m[1] - beside_m - left_m, cell_m, n))

@@ -5,8 +5,12 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.relative import close, direction, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M
-from uas_coverage_env.vehicle import X, Y, Z
-from uas_coverage_env.vehicle.range import SpeedLimits, TravelTimeModel, flight_seconds
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.range import (
+    SpeedLimits,
+    TravelTimeModel,
+    flight_seconds,
+)
 from uas_coverage_env.world import HOME as HOME_TARGET
 from uas_coverage_env.world.routes import shortest_way
 
@@ -32,9 +36,9 @@ def _way_home(arena, state, i):
         [m]; depth of discharge that the way costs.
     """
     uas = arena.uas[i]
-    x = state.x[i, X]
-    y = state.x[i, Y]
-    z = state.x[i, Z]
+    x = state.x[i, S.X]
+    y = state.x[i, S.Y]
+    z = state.x[i, S.Z]
     target, x1, y1, z1 = target_position(arena, i, HOME_TARGET)
     leg_x, leg_y, way_m = shortest_way(arena, target, x, y, z, x1, y1, z1)
     speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
@@ -53,7 +57,7 @@ def charge_home(arena, state, i):
 def write_home(arena, state, i, row):
     """Write the group; returns the depth of discharge that the way costs."""
     leg_x, leg_y, way_m, below_m, home_dod = _way_home(arena, state, i)
-    direction(leg_x - state.x[i, X], leg_y - state.x[i, Y], row, _AT.direction)
+    direction(leg_x - state.x[i, S.X], leg_y - state.x[i, S.Y], row, _AT.direction)
     row[_AT.closeness] = close(way_m)
     row[_AT.below] = within(below_m * (1.0 / HEIGHT_M), -1.0, 1.0)
     return home_dod

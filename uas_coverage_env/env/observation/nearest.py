@@ -13,7 +13,7 @@ from uas_coverage_env.env.observation.relative import close
 from uas_coverage_env.env.observation.scales import DENSEST, DENSITY_M, K_WAYPOINTS
 from uas_coverage_env.env.observation.sorted_list import insert
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.coverage import can_cover
 from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M
 
@@ -90,9 +90,9 @@ def nearest_waypoints(arena, state, i, candidates):
             What is in it, from the step before, hardly changes and is looked at first; it may be
             anything in which nothing is twice.
     """
-    x = state.x[i, X]
-    y = state.x[i, Y]
-    z = state.x[i, Z]
+    x = state.x[i, S.X]
+    y = state.x[i, S.Y]
+    z = state.x[i, S.Z]
     columns = arena.waypoint_columns
     uncovered = state.uncovered
     n_waypoints = uncovered.shape[0]

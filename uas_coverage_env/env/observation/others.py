@@ -17,7 +17,7 @@ from uas_coverage_env.env.observation.relative import (
 )
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_UAS
 from uas_coverage_env.env.observation.sorted_list import insert
-from uas_coverage_env.vehicle import VX, VY, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import FLYING
 
 _FEATURES = (
@@ -45,7 +45,7 @@ def write_others(arena, state, tables, i, row):
     for j in range(state.uas.shape[0]):
         if j != i and state.uas[j].status == FLYING:
             other = state.x[j]
-            m = apart_m(other[X] - x[X], other[Y] - x[Y], other[Z] - x[Z])
+            m = apart_m(other[S.X] - x[S.X], other[S.Y] - x[S.Y], other[S.Z] - x[S.Z])
             found = insert(index, away_m, found, j, m)
     for at in range(_WIDTH * K_UAS):
         row[at] = 0.0
@@ -54,11 +54,11 @@ def write_others(arena, state, tables, i, row):
         other = state.x[nearest]
         at = _WIDTH * c
         row[at + _AT.valid] = 1.0
-        direction(other[X] - x[X], other[Y] - x[Y], row, at + _AT.direction)
+        direction(other[S.X] - x[S.X], other[S.Y] - x[S.Y], row, at + _AT.direction)
         row[at + _AT.closeness] = close(away_m[c])
-        row[at + _AT.below] = within((other[Z] - x[Z]) / HEIGHT_M, -1.0, 1.0)
-        row[at + _AT.velocity] = within((other[VX] - x[VX]) * scale.per_v_xy, -2.0, 2.0)
-        row[at + _AT.velocity + 1] = within((other[VY] - x[VY]) * scale.per_v_xy, -2.0, 2.0)
+        row[at + _AT.below] = within((other[S.Z] - x[S.Z]) / HEIGHT_M, -1.0, 1.0)
+        row[at + _AT.velocity] = within((other[S.VX] - x[S.VX]) * scale.per_v_xy, -2.0, 2.0)
+        row[at + _AT.velocity + 1] = within((other[S.VY] - x[S.VY]) * scale.per_v_xy, -2.0, 2.0)
         row[at + _AT.charge_left] = charge_left(arena, state, nearest)
 
 

@@ -6,23 +6,8 @@ from uas_coverage_env.env.observation.home import charge_home
 from uas_coverage_env.env.observation.relative import charge_left, within
 from uas_coverage_env.env.observation.remaining import share_of_open_weight
 from uas_coverage_env.env.observation.scales import MARGIN
-from uas_coverage_env.vehicle import (
-    DOD,
-    PHI,
-    PSI,
-    THETA,
-    U_TH,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WY,
-    WZ,
-    X,
-    Y,
-    Z,
-    within_half_turn,
-)
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle import within_half_turn
 from uas_coverage_env.world import FLYING
 
 _FEATURES = (
@@ -64,31 +49,33 @@ def write_own(arena, state, tables, i, home_dod, open_share, row):
     x = state.x[i]
     scale = tables.scales[i]
     max_steps = arena.rules[0].max_steps
-    row[_AT.position] = within((x[X] - scale.centre_m[0]) * scale.per_half_side[0], -1.0, 1.0)
-    row[_AT.position + 1] = within((x[Y] - scale.centre_m[1]) * scale.per_half_side[1], -1.0, 1.0)
-    row[_AT.position + 2] = within((scale.centre_m[2] - x[Z]) * scale.per_half_side[2], -1.0, 1.0)
-    row[_AT.velocity] = within(x[VX] * scale.per_v_xy, -2.0, 2.0)
-    row[_AT.velocity + 1] = within(x[VY] * scale.per_v_xy, -2.0, 2.0)
-    row[_AT.velocity + 2] = within(x[VZ] * scale.per_v_z, -2.0, 2.0)
-    row[_AT.attitude] = within(x[PHI] * scale.per_tilt, -2.0, 2.0)
-    row[_AT.attitude + 1] = within(x[THETA] * scale.per_tilt, -2.0, 2.0)
-    yaw = x[PSI]
+    row[_AT.position] = within((x[S.X] - scale.centre_m[0]) * scale.per_half_side[0], -1.0, 1.0)
+    row[_AT.position + 1] = within((x[S.Y] - scale.centre_m[1]) * scale.per_half_side[1], -1.0, 1.0)
+    row[_AT.position + 2] = within((scale.centre_m[2] - x[S.Z]) * scale.per_half_side[2], -1.0, 1.0)
+    row[_AT.velocity] = within(x[S.VX] * scale.per_v_xy, -2.0, 2.0)
+    row[_AT.velocity + 1] = within(x[S.VY] * scale.per_v_xy, -2.0, 2.0)
+    row[_AT.velocity + 2] = within(x[S.VZ] * scale.per_v_z, -2.0, 2.0)
+    row[_AT.attitude] = within(x[S.PHI] * scale.per_tilt, -2.0, 2.0)
+    row[_AT.attitude + 1] = within(x[S.THETA] * scale.per_tilt, -2.0, 2.0)
+    yaw = x[S.PSI]
     if rarely(arena.vehicles[i].follows_course):
         yaw = within_half_turn(yaw)
     row[_AT.attitude + 2] = within(yaw * scale.per_yaw, -2.0, 2.0)
-    row[_AT.rates] = within(x[WX] * scale.per_rate, -2.0, 2.0)
-    row[_AT.rates + 1] = within(x[WY] * scale.per_rate, -2.0, 2.0)
-    row[_AT.rates + 2] = within(x[WZ] * scale.per_yaw_rate, -2.0, 2.0)
+    row[_AT.rates] = within(x[S.WX] * scale.per_rate, -2.0, 2.0)
+    row[_AT.rates + 1] = within(x[S.WY] * scale.per_rate, -2.0, 2.0)
+    row[_AT.rates + 2] = within(x[S.WZ] * scale.per_yaw_rate, -2.0, 2.0)
     row[_AT.reference] = within(state.uas[i].reference_mps[0] * scale.per_v_xy, -2.0, 2.0)
     row[_AT.reference + 1] = within(state.uas[i].reference_mps[1] * scale.per_v_xy, -2.0, 2.0)
     row[_AT.flying] = 1.0 if state.uas[i].status == FLYING else 0.0
     row[_AT.departed] = 1.0 if state.uas[i].departed else 0.0
     row[_AT.returning] = 1.0 if state.uas[i].returning else 0.0
     row[_AT.rank] = scale.rank
-    row[_AT.dod] = within(x[DOD], 0.0, 1.0)
-    row[_AT.polarisation] = within(x[U_TH], -1.0, 1.0)
+    row[_AT.dod] = within(x[S.DOD], 0.0, 1.0)
+    row[_AT.polarisation] = within(x[S.U_TH], -1.0, 1.0)
     row[_AT.charge_left] = charge_left(arena, state, i)
-    row[_AT.energy_margin] = within((arena.uas[i].dod_max - x[DOD] - home_dod) / MARGIN, -1.0, 1.0)
+    row[_AT.energy_margin] = within(
+        (arena.uas[i].dod_max - x[S.DOD] - home_dod) / MARGIN, -1.0, 1.0
+    )
     row[_AT.time_left] = within((max_steps - state.step[0]) / max_steps, 0.0, 1.0)
     row[_AT.uncovered] = within(open_share, 0.0, 1.0)
 

@@ -8,7 +8,7 @@ from uas_coverage_env.env.observation.block import Feature, Group, ObservationBl
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, N_RAYS, RAY_M
 from uas_coverage_env.geometry import signed_distance
-from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.broad_phase import (
     BLOCK,
     HULL_HALF,
@@ -288,9 +288,9 @@ def write_surroundings(arena, state, i, row):
     normals = arena.normals
     offsets_m = arena.offsets_m
     rules = arena.rules[0]
-    x = state.x[i, X]
-    y = state.x[i, Y]
-    z = state.x[i, Z]
+    x = state.x[i, S.X]
+    y = state.x[i, S.Y]
+    z = state.x[i, S.Z]
     free_m = stack_array(N_RAYS)
     inside_m = _rays_to_fence(
         normals, offsets_m, rules.fence_first, rules.fence_last, x, y, z, free_m

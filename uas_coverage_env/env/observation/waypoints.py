@@ -15,7 +15,7 @@ from uas_coverage_env.env.observation.block import (
 from uas_coverage_env.env.observation.nearest import DENSITY, NEXT
 from uas_coverage_env.env.observation.relative import STRAIGHT_M, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_WAYPOINTS, MARGIN, NEARBY_M
-from uas_coverage_env.vehicle import DOD, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, WEIGHT
 
@@ -62,9 +62,9 @@ def _others_near(state, i, targets, wanted, n, north_m, east_m, down_m, other_m2
     for j in range(state.uas.shape[0]):
         if j == i or state.uas[j].status != FLYING:
             continue
-        x = state.x[j, X]
-        y = state.x[j, Y]
-        z = state.x[j, Z]
+        x = state.x[j, S.X]
+        y = state.x[j, S.Y]
+        z = state.x[j, S.Z]
         for c in range(n):
             dx = np.float32(north_m[c] - x)
             dy = np.float32(east_m[c] - y)
@@ -95,14 +95,14 @@ def write_waypoints(arena, state, tables, learners, i, row):
     scale = tables.scales[i]
     around = learners.around
     candidates = learners.candidates[i]
-    x = state.x[i, X]
-    y = state.x[i, Y]
-    z = state.x[i, Z]
+    x = state.x[i, S.X]
+    y = state.x[i, S.Y]
+    z = state.x[i, S.Z]
     home_north_m = uas.home_m[0]
     home_east_m = uas.home_m[1]
     home_down_m = uas.home_m[2]
     margin_per_m = np.float32(uas.dod_per_s / (uas.speed_mps * MARGIN))
-    margin_left = np.float32((uas.dod_max - state.x[i, DOD]) * (1.0 / MARGIN))
+    margin_left = np.float32((uas.dod_max - state.x[i, S.DOD]) * (1.0 / MARGIN))
     wanted = stack_array(K_WAYPOINTS)
     north_m = stack_array(K_WAYPOINTS)
     east_m = stack_array(K_WAYPOINTS)

@@ -4,7 +4,7 @@ from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.relative import charge_left, within
 from uas_coverage_env.scenario import MissionSource, ScenarioLike
-from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import FLYING, LANDED, SWAPPING
 
 _MOVING_MPS = 20.0
@@ -56,10 +56,10 @@ def _write_uas(arena, state, tables, learners, i, parameters, row):
         row[at + _U.itself] = 1.0 if j == i else 0.0
         row[at + _U.flying] = 1.0 if status == FLYING else 0.0
         row[at + _U.landed] = 1.0 if status in (LANDED, SWAPPING) else 0.0
-        _place(scale, x[X], x[Y], x[Z], row, at + _U.position)
-        row[at + _U.velocity] = within(x[VX] * scale.per_v_xy, -2.0, 2.0)
-        row[at + _U.velocity + 1] = within(x[VY] * scale.per_v_xy, -2.0, 2.0)
-        row[at + _U.velocity + 2] = within(x[VZ] * scale.per_v_z, -2.0, 2.0)
+        _place(scale, x[S.X], x[S.Y], x[S.Z], row, at + _U.position)
+        row[at + _U.velocity] = within(x[S.VX] * scale.per_v_xy, -2.0, 2.0)
+        row[at + _U.velocity + 1] = within(x[S.VY] * scale.per_v_xy, -2.0, 2.0)
+        row[at + _U.velocity + 2] = within(x[S.VZ] * scale.per_v_z, -2.0, 2.0)
         row[at + _U.charge_left] = charge_left(arena, state, j)
 
 

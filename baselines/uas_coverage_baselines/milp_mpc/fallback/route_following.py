@@ -27,15 +27,13 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission import MissionBrief, carefully, seconds_home, with_free_aims
 from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
 from uas_coverage_env.vehicle import (
-    DOD,
-    VX,
-    VZ,
     compile_vehicle,
     dod_per_s,
     lpv_step,
     reseed_reference,
     velocity_climb_wrench,
 )
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import COMMAND_DTYPE, HOME, SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]
@@ -149,7 +147,7 @@ class RouteFollower:
             uas: row of the UAS.
         """
         x, most = problem.x0[uas], float(problem.dod_max[uas])
-        left_s = (most - float(x[DOD])) / dod_per_s(problem.vehicles[uas], most)
+        left_s = (most - float(x[S.DOD])) / dod_per_s(problem.vehicles[uas], most)
         home_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
         return left_s - home_s < _NEXT_STEPS * self._brief.dt_s
 
@@ -160,17 +158,17 @@ class RouteFollower:
         per_s = dod_per_s(problem.vehicles[uas], most)
         clock_s = (rules.max_steps - swarm.step) * rules.dt_s
         roughly_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
-        left_s = min((most - float(x[DOD])) / per_s, clock_s) - roughly_s
+        left_s = min((most - float(x[S.DOD])) / per_s, clock_s) - roughly_s
         if left_s > ROUTE_HOME_RESERVE.kept_s:
             return left_s
         steps = int(np.ceil(_LONGEST_WAY_S / rules.dt_s))
         states, _ = self._flown(problem, uas, steps, steps)
         away_m = np.linalg.norm(states[:, :3] - problem.home_m[uas], axis=1)
-        slow = np.linalg.norm(states[:, VX : VZ + 1], axis=1) < rules.landing_speed_mps
+        slow = np.linalg.norm(states[:, S.VX : S.VZ + 1], axis=1) < rules.landing_speed_mps
         there = np.flatnonzero((away_m <= rules.landing_distance_m) & slow)
         if not len(there):
             return -np.inf
-        battery_s = (most - float(states[there[0], DOD])) / per_s
+        battery_s = (most - float(states[there[0], S.DOD])) / per_s
         return min(battery_s, clock_s - int(there[0]) * rules.dt_s)
 
     def _replaced(

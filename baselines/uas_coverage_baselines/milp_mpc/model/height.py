@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.flown import pushed
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
-from uas_coverage_env.vehicle import VZ, X, Y, Z, compile_vehicle
+from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle import layout as S
 
 FloatArray = NDArray[np.float64]
 _ROUNDING_M = 1e-3
@@ -31,12 +32,12 @@ def least_heights_m(problem: PlanningProblem, uas: int, steps: int) -> FloatArra
         (steps+1,).
     """
     x, least_m = problem.x0[uas], np.full(steps + 1, problem.min_height_m)
-    if _in_zone(problem, uas, x[:3]) or (-x[Z] >= problem.min_height_m and x[VZ] <= 0.0):
+    if _in_zone(problem, uas, x[:3]) or (-x[S.Z] >= problem.min_height_m and x[S.VZ] <= 0.0):
         return least_m
     vehicle = problem.vehicles[uas]
     record = compile_vehicle(vehicle, problem.dt_s)[()]
     climbing, _ = pushed(record, x, 0.0, 0.0, -vehicle.limits.v_up_max_mps, steps, steps)
-    return np.minimum(least_m, -climbing[:, Z] - _ROUNDING_M)
+    return np.minimum(least_m, -climbing[:, S.Z] - _ROUNDING_M)
 
 
 def too_low_m(problem: PlanningProblem, uas: int, path: FloatArray) -> FloatArray:
@@ -52,7 +53,7 @@ def too_low_m(problem: PlanningProblem, uas: int, path: FloatArray) -> FloatArra
     """
     if not problem.min_height_m:
         return np.zeros(path.shape[:-1])
-    low_m = np.maximum(least_heights_m(problem, uas, path.shape[-2] - 1) + path[..., Z], 0.0)
+    low_m = np.maximum(least_heights_m(problem, uas, path.shape[-2] - 1) + path[..., S.Z], 0.0)
     low_m[_in_zone(problem, uas, path)] = 0.0
     low_m[..., 0] = 0.0
     return low_m
@@ -60,4 +61,4 @@ def too_low_m(problem: PlanningProblem, uas: int, path: FloatArray) -> FloatArra
 
 def _in_zone(problem: PlanningProblem, uas: int, position: FloatArray) -> NDArray[np.bool_]:
     away = position - problem.home_m[uas]
-    return np.asarray(np.hypot(away[..., X], away[..., Y]) <= problem.landing_zone_m)
+    return np.asarray(np.hypot(away[..., S.X], away[..., S.Y]) <= problem.landing_zone_m)

@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.flown import pushed
 from uas_coverage_env.geometry import cylinder_faces, inner_factor
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY, VZ, WX, WY, VehicleParams, compile_vehicle
+from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
+from uas_coverage_env.vehicle import layout as S
 
 FloatArray = NDArray[np.float64]
 
 NORMS = (
-    ("speed", VX, VY, "v_xy_max_mps"),
-    ("tilt", PHI, THETA, "tilt_max_rad"),
-    ("rate", WX, WY, "rate_max_radps"),
+    ("speed", S.VX, S.VY, "v_xy_max_mps"),
+    ("tilt", S.PHI, S.THETA, "tilt_max_rad"),
+    ("rate", S.WX, S.WY, "rate_max_radps"),
 )
 """Name, two states, and the limit of their norm."""
 
@@ -74,9 +75,9 @@ def norm_bounds(
     if (faces @ x0[pairs].T <= inner * limits * (1.0 + _ROUNDING)).all():
         return NormBounds(upper, np.full(len(NORMS), inner / inner_factor(sides, 2)))
     record = compile_vehicle(vehicle, dt_s)[()]
-    speed_mps = max(float(np.hypot(x0[VX], x0[VY])), 1e-9)
+    speed_mps = max(float(np.hypot(x0[S.VX], x0[S.VY])), 1e-9)
     share = min(1.0, inner * limits[0] / speed_mps)
-    for north, east, down in ((0.0, 0.0, 0.0), (share * x0[VX], share * x0[VY], x0[VZ])):
+    for north, east, down in ((0.0, 0.0, 0.0), (share * x0[S.VX], share * x0[S.VY], x0[S.VZ])):
         states = pushed(record, x0, north, east, down, horizon, horizon)[0][1:]
         reached = np.array([states[:, pair] @ faces.T for pair in pairs])
         # free of rounding, so that the flight itself satisfies them

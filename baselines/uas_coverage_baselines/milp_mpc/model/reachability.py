@@ -24,22 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.geometry import ConvexPolytope, cylinder_faces
-from uas_coverage_env.vehicle import (
-    LIFT,
-    PHI,
-    TAU_Y,
-    THETA,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WY,
-    LinearModel,
-    VehicleParams,
-    X,
-    Z,
-)
-from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED, TILT
+from uas_coverage_env.vehicle import LinearModel, VehicleParams
+from uas_coverage_env.vehicle import layout as S
 
 FloatArray = NDArray[np.float64]
 _AXES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
@@ -174,11 +160,11 @@ class _Chain:
         sides: int,
         beyond: FloatArray,
     ) -> _Chain:
-        index = [X, VX, THETA, WY]
+        index = [S.X, S.VX, S.THETA, S.WY]
         sign = np.array([1.0, 1.0, -1.0, -1.0])  # tilt forward is negative pitch
         a = model.A[np.ix_(index, index)] * np.outer(sign, sign)
         inertia = vehicle.airframe.inertia_kgm2
-        b = model.B[index, TAU_Y] * sign * -inertia[1]
+        b = model.B[index, S.TAU_Y] * sign * -inertia[1]
         limits = vehicle.limits
         alpha = np.full(2, limits.angular_acceleration_xy_max_radps2)
         polygon = _polygon(sides)
@@ -190,15 +176,17 @@ class _Chain:
             beyond[1] * limits.tilt_max_rad * polygon,
             beyond[2] * limits.rate_max_radps * polygon,
             alpha,
-            float(model.A[Z, VZ]),
+            float(model.A[S.Z, S.VZ]),
             (limits.v_down_max_mps, limits.v_up_max_mps),
         )
 
     def displacement(self, x: FloatArray, unit: FloatArray) -> FloatArray:
         """(N+1, F) largest unit · (north, east) of what n steps can move, from any sample."""
         c1, c2, c3, epsilon = self._telescoped()
-        fastest = np.maximum(np.max(unit @ self.speed_vertices.T, axis=1), unit @ x[VX : VY + 1])
-        tilted = unit @ np.array([-x[THETA], x[PHI]])
+        fastest = np.maximum(
+            np.max(unit @ self.speed_vertices.T, axis=1), unit @ x[S.VX : S.VY + 1]
+        )
+        tilted = unit @ np.array([-x[S.THETA], x[S.PHI]])
         ahead = np.maximum(np.max(unit @ self.tilt_vertices.T, axis=1), tilted)
         behind = np.maximum(np.max(-unit @ self.tilt_vertices.T, axis=1), -tilted)
         alpha = np.abs(unit) @ self.alpha_max
@@ -208,34 +196,34 @@ class _Chain:
 
     def vertical_stride_m(self, x: FloatArray) -> tuple[float, float]:
         """Largest downward and upward way within one step, from any sample."""
-        down = self.dt_s * max(self.climb_limits_mps[0], float(x[VZ]))
-        up = self.dt_s * max(self.climb_limits_mps[1], -float(x[VZ]))
+        down = self.dt_s * max(self.climb_limits_mps[0], float(x[S.VZ]))
+        up = self.dt_s * max(self.climb_limits_mps[1], -float(x[S.VZ]))
         return down, up
 
     def _telescoped(self) -> tuple[float, float, float, float]:
         """c1, c2, c3 and epsilon of the one-step map as rewritten above."""
-        (_, p_v, p_t, p_w), (_, v_v, v_t, v_w) = self.a[POSITION], self.a[SPEED]
+        (_, p_v, p_t, p_w), (_, v_v, v_t, v_w) = self.a[S.POSITION], self.a[S.SPEED]
         b_p, b_v, b_t, _ = self.b
         c2 = p_t / v_t
-        c3 = (c2 * v_w - p_w) / self.a[TILT, RATE]
+        c3 = (c2 * v_w - p_w) / self.a[S.TILT, S.RATE]
         return p_v - c2 * v_v, c2, c3, b_p - c2 * b_v + c3 * b_t
 
     def support(self, x: FloatArray, unit: FloatArray) -> FloatArray:
         """(N+1, F) largest unit · (north, east) of the position."""
-        position, velocity = unit @ x[0:2], unit @ x[VX : VY + 1]
-        tilt, rate = unit @ np.array([-x[THETA], x[PHI]]), unit @ np.array([-x[WY], x[WX]])
+        position, velocity = unit @ x[0:2], unit @ x[S.VX : S.VY + 1]
+        tilt, rate = unit @ np.array([-x[S.THETA], x[S.PHI]]), unit @ np.array([-x[S.WY], x[S.WX]])
         fastest = np.max(unit @ self.speed_vertices.T, axis=1)
         steepest = np.max(unit @ self.tilt_vertices.T, axis=1)
         quickest = np.max(unit @ self.rate_vertices.T, axis=1)
         alpha = np.abs(unit) @ self.alpha_max
-        _, v_v, v_t, v_w = self.a[SPEED]
+        _, v_v, v_t, v_w = self.a[S.SPEED]
         _, b_v, b_t, b_w = self.b
         c1, c2, c3, epsilon = self._telescoped()
         speeds = [velocity]
         v, t, w = velocity, tilt, rate
         for _ in range(self.horizon):
             v = np.minimum(fastest, v_v * v + v_t * t + v_w * w + b_v * alpha)
-            t = np.minimum(steepest, t + self.a[TILT, RATE] * w + b_t * alpha)
+            t = np.minimum(steepest, t + self.a[S.TILT, S.RATE] * w + b_t * alpha)
             w = np.minimum(quickest, w + b_w * alpha)
             speeds.append(v)
         largest = np.array(speeds)
@@ -253,8 +241,8 @@ def _vertical(
 ) -> FloatArray:
     """(2, N+1): largest z and largest -z."""
     limits = vehicle.limits
-    dt = model.A[Z, VZ]
-    per_newton = -model.B[VZ, LIFT]
+    dt = model.A[S.Z, S.VZ]
+    per_newton = -model.B[S.VZ, S.LIFT]
     result = np.empty((2, horizon + 1))
     for row, (sign, fastest, push) in enumerate(
         [
@@ -262,7 +250,7 @@ def _vertical(
             (-1.0, limits.v_up_max_mps, limits.lift_max_N),
         ]
     ):
-        position, speed = sign * x[Z], sign * x[VZ]
+        position, speed = sign * x[S.Z], sign * x[S.VZ]
         result[row, 0] = position
         for step in range(1, horizon + 1):
             following = min(fastest, speed + per_newton * push)

@@ -15,13 +15,11 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.planning.reserves import BRAKING_S, MILP_RESERVE
 from uas_coverage_env.vehicle import (
-    DELTA_THRUST,
-    DOD,
-    U_TH,
     LinearModel,
     VehicleParams,
     dod_per_s,
 )
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import (
     flight_seconds,
     level_seconds,
@@ -30,7 +28,7 @@ from uas_coverage_env.vehicle.range import (
 )
 
 FloatArray = NDArray[np.float64]
-_BATTERY = [DOD, U_TH]
+_BATTERY = [S.DOD, S.U_TH]
 
 SETTLING_S = BRAKING_S + MILP_RESERVE.landing_s
 """What the reserve holds back beyond the flight home itself [s]."""
@@ -77,7 +75,7 @@ class BatteryReserve:
             milp.subject_to(
                 f"reserve.{name}",
                 (faces, v.position[uas, -1][None, :]),
-                (gain / rate, v.u[uas, :, DELTA_THRUST][None, :]),
+                (gain / rate, v.u[uas, :, S.DELTA_THRUST][None, :]),
                 (-1.0, short[None, :]),
                 upper=room,
                 where=excess > 0.0,
@@ -110,7 +108,7 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
         allowance: whether it still has to brake to a hover.
     """
     way_s = float((_time_faces(problem, uas) @ (x[:3] - _towards_m(problem, uas))).max())
-    spent_s = float(x[DOD]) / _rate(problem, uas)
+    spent_s = float(x[S.DOD]) / _rate(problem, uas)
     result = spent_s + way_s - _room_s(problem, uas)
     return result if allowance else result - BRAKING_S
 
@@ -173,7 +171,7 @@ def _time_faces(problem: PlanningProblem, uas: int) -> FloatArray:
 
 def _last_dod(model: LinearModel, battery: FloatArray, horizon: int) -> tuple[float, FloatArray]:
     """DoD(N) = start + gain · Delta T, from the battery's rows of the dynamics; gain (N,)."""
-    A, B, E = model.A[np.ix_(_BATTERY, _BATTERY)], model.B[_BATTERY, DELTA_THRUST], model.E
+    A, B, E = model.A[np.ix_(_BATTERY, _BATTERY)], model.B[_BATTERY, S.DELTA_THRUST], model.E
     gain, later = np.empty(horizon), np.eye(2)
     start = battery
     for n in range(horizon):

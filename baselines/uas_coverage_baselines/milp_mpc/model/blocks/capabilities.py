@@ -8,22 +8,7 @@ from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
 from uas_coverage_env.geometry import cylinder_faces
-from uas_coverage_env.vehicle import (
-    DELTA_THRUST,
-    DOD,
-    LIFT,
-    PHI,
-    PSI,
-    TAU_X,
-    TAU_Y,
-    TAU_Z,
-    THETA,
-    U_TH,
-    VX,
-    VY,
-    VZ,
-    WZ,
-)
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.layout import CURRENT, VOLTAGE
 
 
@@ -58,17 +43,22 @@ class Capabilities:
         torque = [problem.torque_max_Nm(axis)[:, None] for axis in range(3)]
         cutoff = np.array([vehicle.battery.dod_cutoff for vehicle in problem.vehicles])[:, None]
         for name, columns, low, high in (
-            ("climb", v.x[:, 1:, VZ], -limit("v_up_max_mps"), limit("v_down_max_mps")),
-            ("yaw", v.x[:, 1:, PSI], -limit("yaw_max_rad"), limit("yaw_max_rad")),
-            ("yaw_rate", v.x[:, 1:, WZ], -limit("yaw_rate_max_radps"), limit("yaw_rate_max_radps")),
-            ("dod", v.x[:, 1:, DOD], -np.inf, cutoff),
-            ("lift", v.u[:, :, LIFT], limit("lift_min_N"), limit("lift_max_N")),
-            ("torque_x", v.u[:, :, TAU_X], -torque[0], torque[0]),
-            ("torque_y", v.u[:, :, TAU_Y], -torque[1], torque[1]),
-            ("torque_z", v.u[:, :, TAU_Z], -torque[2], torque[2]),
+            ("climb", v.x[:, 1:, S.VZ], -limit("v_up_max_mps"), limit("v_down_max_mps")),
+            ("yaw", v.x[:, 1:, S.PSI], -limit("yaw_max_rad"), limit("yaw_max_rad")),
+            (
+                "yaw_rate",
+                v.x[:, 1:, S.WZ],
+                -limit("yaw_rate_max_radps"),
+                limit("yaw_rate_max_radps"),
+            ),
+            ("dod", v.x[:, 1:, S.DOD], -np.inf, cutoff),
+            ("lift", v.u[:, :, S.LIFT], limit("lift_min_N"), limit("lift_max_N")),
+            ("torque_x", v.u[:, :, S.TAU_X], -torque[0], torque[0]),
+            ("torque_y", v.u[:, :, S.TAU_Y], -torque[1], torque[1]),
+            ("torque_z", v.u[:, :, S.TAU_Z], -torque[2], torque[2]),
             (
                 "delta_thrust",
-                v.u[:, :, DELTA_THRUST],
+                v.u[:, :, S.DELTA_THRUST],
                 limit("delta_thrust_min_N"),
                 limit("delta_thrust_max_N"),
             ),
@@ -88,7 +78,7 @@ class Capabilities:
         per_tilt = np.array([c.tilt_N_per_rad for c in corrections])[:, None, None, None]
         trim = np.array([vehicle.trim_tilt_rad_per_mps for vehicle in problem.vehicles])
         trim = trim[:, None, None, None]
-        velocity, attitude = v.x[:, :-1, None, [VX, VY]], v.x[:, :-1, None, [PHI, THETA]]
+        velocity, attitude = v.x[:, :-1, None, [S.VX, S.VY]], v.x[:, :-1, None, [S.PHI, S.THETA]]
         milp.subject_to(
             "thrust.of_speed",
             (1.0, speed[..., None, None]),
@@ -108,9 +98,9 @@ class Capabilities:
             per_climb = np.array([getattr(c, f"{name}_N_per_mps") for c in corrections])
             milp.subject_to(
                 f"thrust.correction_{name}",
-                (1.0, v.u[:, :, DELTA_THRUST, None]),
-                (-1.0, v.u[:, :, LIFT, None]),
-                (per_climb[:, None, None], v.x[:, :-1, VZ, None]),
+                (1.0, v.u[:, :, S.DELTA_THRUST, None]),
+                (-1.0, v.u[:, :, S.LIFT, None]),
+                (per_climb[:, None, None], v.x[:, :-1, S.VZ, None]),
                 (-1.0, speed[..., None]),
                 (-1.0, tilt[..., None]),
                 lower=0.0,
@@ -118,10 +108,10 @@ class Capabilities:
 
     def _battery(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
         """Output equations: the battery's current and voltage stay within its limits."""
-        states = v.x[:, :-1, [DOD, U_TH]]
-        thrust = v.u[:, :, [DELTA_THRUST]]
-        C = np.array([model.C[:, [DOD, U_TH]] for model in problem.models])
-        D = np.array([model.D[:, [DELTA_THRUST]] for model in problem.models])
+        states = v.x[:, :-1, [S.DOD, S.U_TH]]
+        thrust = v.u[:, :, [S.DELTA_THRUST]]
+        C = np.array([model.C[:, [S.DOD, S.U_TH]] for model in problem.models])
+        D = np.array([model.D[:, [S.DELTA_THRUST]] for model in problem.models])
         F = np.array([model.F for model in problem.models])
         voltage_min = np.array([x.battery.voltage_min_V for x in problem.vehicles])
         current_max = np.array([x.battery.current_max_A for x in problem.vehicles])

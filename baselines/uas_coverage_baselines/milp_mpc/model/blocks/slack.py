@@ -6,7 +6,7 @@ import numpy as np
 
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
-from uas_coverage_env.vehicle import DOD, LIFT, PSI, TAU_X, TAU_Y, TAU_Z, VZ, WX, WY, WZ
+from uas_coverage_env.vehicle import layout as S
 
 
 class Slack:
@@ -21,15 +21,15 @@ class Slack:
         w = problem.weights
         limit, torque = problem.limit, problem.torque_max_Nm
         for name, columns, weight, largest in (
-            ("lift", v.u[:, :, LIFT], w.lift, limit("lift_max_N")),
-            ("torque_x", v.u[:, :, TAU_X], w.torque, torque(0)),
-            ("torque_y", v.u[:, :, TAU_Y], w.torque, torque(1)),
-            ("torque_z", v.u[:, :, TAU_Z], w.torque, torque(2)),
-            ("rate_x", v.x[:, 1:, WX], w.rate, limit("rate_max_radps")),
-            ("rate_y", v.x[:, 1:, WY], w.rate, limit("rate_max_radps")),
-            ("rate_z", v.x[:, 1:, WZ], w.rate, limit("yaw_rate_max_radps")),
-            ("yaw", v.x[:, 1:, PSI], w.yaw, limit("yaw_max_rad")),
-            ("climb", v.x[:, 1:, VZ], w.climb, limit("v_down_max_mps")),
+            ("lift", v.u[:, :, S.LIFT], w.lift, limit("lift_max_N")),
+            ("torque_x", v.u[:, :, S.TAU_X], w.torque, torque(0)),
+            ("torque_y", v.u[:, :, S.TAU_Y], w.torque, torque(1)),
+            ("torque_z", v.u[:, :, S.TAU_Z], w.torque, torque(2)),
+            ("rate_x", v.x[:, 1:, S.WX], w.rate, limit("rate_max_radps")),
+            ("rate_y", v.x[:, 1:, S.WY], w.rate, limit("rate_max_radps")),
+            ("rate_z", v.x[:, 1:, S.WZ], w.rate, limit("yaw_rate_max_radps")),
+            ("yaw", v.x[:, 1:, S.PSI], w.yaw, limit("yaw_max_rad")),
+            ("climb", v.x[:, 1:, S.VZ], w.climb, limit("v_down_max_mps")),
         ):
             if weight == 0.0:
                 continue
@@ -42,11 +42,11 @@ class Slack:
                     lower=0.0,
                 )
             milp.minimize(weight / largest[:, None], slack)
-        hovering = np.array([model.E[DOD] for model in problem.models])
-        milp.minimize(w.energy / hovering[:, None], v.x[:, 1:, DOD])
+        hovering = np.array([model.E[S.DOD] for model in problem.models])
+        milp.minimize(w.energy / hovering[:, None], v.x[:, 1:, S.DOD])
         # what hovering takes in any case: left out, so that J is what the plan can influence
         steps = np.arange(1, problem.horizon + 1)
-        in_any_case = problem.x0[:, DOD, None] + hovering[:, None] * steps
+        in_any_case = problem.x0[:, S.DOD, None] + hovering[:, None] * steps
         milp.add_constant(-float((w.energy / hovering[:, None] * in_any_case).sum()))
 
     def cost_along(self, problem: PlanningProblem, uas: int, flights: Trajectories) -> np.ndarray:
@@ -64,12 +64,12 @@ def _steadiness_cost(problem: PlanningProblem, uas: int, x: np.ndarray, u: np.nd
     w, vehicle = problem.weights, problem.vehicles[uas]
     limits, torque = vehicle.limits, vehicle.torque_max_Nm
     rate, yaw_rate = limits.rate_max_radps, limits.yaw_rate_max_radps
-    inputs = np.abs(u[:, [LIFT, TAU_X, TAU_Y, TAU_Z]]).sum(axis=0)
-    states = np.abs(x[1:, [WX, WY, WZ, PSI]]).sum(axis=0)
+    inputs = np.abs(u[:, [S.LIFT, S.TAU_X, S.TAU_Y, S.TAU_Z]]).sum(axis=0)
+    states = np.abs(x[1:, [S.WX, S.WY, S.WZ, S.PSI]]).sum(axis=0)
     cost = inputs @ np.array([w.lift / limits.lift_max_N, *(w.torque / t for t in torque[:3])])
     cost += states @ np.array([w.rate / rate, w.rate / rate, w.rate / yaw_rate, 0.0])
     cost += states[-1] * w.yaw / limits.yaw_max_rad
-    cost += float(np.abs(x[1:, VZ]).sum()) * w.climb / limits.v_down_max_mps
-    hovering = problem.models[uas].E[DOD]
-    in_any_case = x[0, DOD] + hovering * np.arange(1, len(x))
-    return float(cost + w.energy / hovering * (x[1:, DOD] - in_any_case).sum())
+    cost += float(np.abs(x[1:, S.VZ]).sum()) * w.climb / limits.v_down_max_mps
+    hovering = problem.models[uas].E[S.DOD]
+    in_any_case = x[0, S.DOD] + hovering * np.arange(1, len(x))
+    return float(cost + w.energy / hovering * (x[1:, S.DOD] - in_any_case).sum())

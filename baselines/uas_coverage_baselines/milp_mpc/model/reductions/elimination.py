@@ -24,24 +24,15 @@ from uas_coverage_baselines.milp_mpc.model.blocks import Capabilities, Slack
 from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, ELIMINATED, Milp
 from uas_coverage_baselines.milp_mpc.model.ocp import shared_variables
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
-from uas_coverage_env.vehicle import (
-    DELTA_THRUST,
-    DOD,
-    N_INPUTS,
-    N_STATES,
-    PSI,
-    TAU_Z,
-    U_TH,
-    WZ,
-    LinearModel,
-)
+from uas_coverage_env.vehicle import LinearModel
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.layout import VOLTAGE
 
-_BATTERY = [DOD, U_TH]
-_DOD = _BATTERY.index(DOD)
+_BATTERY = [S.DOD, S.U_TH]
+_DOD = _BATTERY.index(S.DOD)
 _VOLTAGE, _CURRENT = range(2)  # of the outputs from VOLTAGE on
-_YAW = [PSI, WZ]
-_MOTION = [state for state in range(N_STATES) if state not in _BATTERY]
+_YAW = [S.PSI, S.WZ]
+_MOTION = [state for state in range(S.N_STATES) if state not in _BATTERY]
 _AT_REST = 1e-9  # far below the solver's tolerance
 
 
@@ -50,11 +41,11 @@ def motion_variables(milp: Milp, problem: PlanningProblem) -> Variables:
     turned = np.abs(problem.x0[:, _YAW]).max(axis=1) > _AT_REST
     for row, model in enumerate(problem.models):
         turned[row] |= not _yaw_stands_alone(model)
-    states = np.ones((problem.n_uas, N_STATES), bool)
+    states = np.ones((problem.n_uas, S.N_STATES), bool)
     states[:, _BATTERY] = False
     states[:, _YAW] = turned[:, None]
-    inputs = np.ones((problem.n_uas, N_INPUTS), bool)
-    inputs[:, TAU_Z] = turned
+    inputs = np.ones((problem.n_uas, S.N_INPUTS), bool)
+    inputs[:, S.TAU_Z] = turned
     v = shared_variables(milp, problem, states=states, inputs=inputs, coverage_state=False)
     x = v.x.copy()
     x[:, :, _BATTERY] = ELIMINATED
@@ -106,11 +97,11 @@ class BatteryFromThrust:
         """Add the rows that Delta T can break, and the cost of the depth of discharge."""
         for uas, (vehicle, model) in enumerate(zip(problem.vehicles, problem.models, strict=True)):
             start, gain = _response(model, problem.x0[uas, _BATTERY], problem.horizon)
-            thrust = v.u[uas, :, DELTA_THRUST]
-            per_dod = problem.weights.energy / model.E[DOD]
+            thrust = v.u[uas, :, S.DELTA_THRUST]
+            per_dod = problem.weights.energy / model.E[S.DOD]
             milp.minimize(per_dod * gain[1:, _DOD].sum(axis=0), thrust)
             milp.add_constant(per_dod * float(start[1:, _DOD].sum()))
-            C, D = model.C[VOLTAGE:, _BATTERY], model.D[VOLTAGE:, DELTA_THRUST]
+            C, D = model.C[VOLTAGE:, _BATTERY], model.D[VOLTAGE:, S.DELTA_THRUST]
             own = np.eye(problem.horizon)[:, None, :]  # Delta T of the same step
             output = np.einsum("oz,nzk->nok", C, gain[:-1]) + D[:, None] * own
             level = start[:-1] @ C.T + model.F[VOLTAGE:]
@@ -134,7 +125,7 @@ class BatteryFromThrust:
 
 def flown_states(problem: PlanningProblem, inputs: np.ndarray) -> np.ndarray:
     """(U, N+1, 14) all states, eliminated ones too, under inputs (U, N, 5)."""
-    x = np.empty((problem.n_uas, inputs.shape[1] + 1, N_STATES))
+    x = np.empty((problem.n_uas, inputs.shape[1] + 1, S.N_STATES))
     x[:, 0] = problem.x0
     for uas, model in enumerate(problem.models):
         for n, u in enumerate(inputs[uas]):
@@ -147,16 +138,16 @@ def _battery_left_out(v: Variables) -> Variables:
 
 
 def _yaw_stands_alone(model: LinearModel) -> bool:
-    rest = [state for state in range(N_STATES) if state not in _YAW]
-    others = [i for i in range(N_INPUTS) if i != TAU_Z]
+    rest = [state for state in range(S.N_STATES) if state not in _YAW]
+    others = [i for i in range(S.N_INPUTS) if i != S.TAU_Z]
     apart = not model.A[np.ix_(rest, _YAW)].any() and not model.A[np.ix_(_YAW, rest)].any()
-    apart = apart and not model.B[rest, TAU_Z].any() and not model.B[np.ix_(_YAW, others)].any()
+    apart = apart and not model.B[rest, S.TAU_Z].any() and not model.B[np.ix_(_YAW, others)].any()
     return bool(apart and not model.E[_YAW].any())
 
 
 def _response(model: LinearModel, z0: np.ndarray, horizon: int) -> tuple[np.ndarray, np.ndarray]:
     """z(n) = start[n] + gain[n] Delta T: (N+1, 2) and (N+1, 2, N)."""
-    A, B, E = model.A[np.ix_(_BATTERY, _BATTERY)], model.B[_BATTERY, DELTA_THRUST], model.E
+    A, B, E = model.A[np.ix_(_BATTERY, _BATTERY)], model.B[_BATTERY, S.DELTA_THRUST], model.E
     start = np.empty((horizon + 1, 2))
     gain = np.zeros((horizon + 1, 2, horizon))
     start[0] = z0

@@ -5,20 +5,19 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.geometry import cylinder_faces
-from uas_coverage_env.vehicle.battery import battery_segments, check_step, polarisation_decay
+from uas_coverage_env.vehicle import battery, parts
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import (
     N_ROW_COLUMNS,
     ORDER,
     design_velocity_loop,
     horizontal_axis,
 )
-from uas_coverage_env.vehicle.layout import LIFT, VX, VZ, X, Z
 from uas_coverage_env.vehicle.limits import N_LIMITS, bounds_of
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
 from uas_coverage_env.vehicle.true_vehicle import N_PERTURBATIONS
 
-MAX_SEGMENTS = 8
 MAX_GOVERNOR_ROWS = 128
 GOVERNOR_BLOCK = 8
 """So many governor rows are looked at together."""
@@ -32,15 +31,17 @@ PHYSICAL_SIDES = 8
 """H_P, the sides of the polygons that stand for norms in the thrust correction."""
 
 COUNTS = {
-    "n_segments": (0, MAX_SEGMENTS),
+    "n_segments": (0, parts.MAX_SEGMENTS),
     "n_governor_rows": (0, MAX_GOVERNOR_ROWS),
     "n_motors": (0, MAX_MOTORS),
+    "n_further": (0, parts.MAX_FURTHER_PAIRS),
 }
 """How many rows of a record are in use, and how few and many these may be."""
 
 _DT_MIN_S = 0.1  # so that MAX_GOVERNOR_ROWS suffice
 
 _f8, _i8 = "f8", "i8"
+_PARTS = (parts.Airframe, parts.Rotor, parts.Motor, parts.Esc, parts.ThrustCorrection, parts.Limits)
 VEHICLE_DTYPE = record_dtype(
     [
         ("dt_s", _f8),
@@ -54,7 +55,8 @@ VEHICLE_DTYPE = record_dtype(
         ("horizontal_force_B", _f8, (2,)),
         ("yaw_B", _f8, (2,)),
         ("inertia_kgm2", _f8, (3,)),
-        ("mass_kg", _f8),
+        *(field for part in _PARTS for field in part.record_fields()),
+        ("auxiliary_W", _f8),
         # what lift is counted from: the nominal weight, see `true_vehicle`
         ("weight_N", _f8),
         # thrust and power over those of the nominal vehicle at the same speed of the motors, and
@@ -63,44 +65,15 @@ VEHICLE_DTYPE = record_dtype(
         ("power_factor", _f8),
         ("lift_surplus_N", _f8),
         ("perturbation", _f8, (N_PERTURBATIONS,)),
-        # battery: a row per segment of the discharge curve
-        ("n_segments", _i8),
-        ("dod_end", _f8, (MAX_SEGMENTS,)),
-        ("ocv_V", _f8, (MAX_SEGMENTS,)),
-        ("ocv_slope_V", _f8, (MAX_SEGMENTS,)),
-        ("current_A", _f8, (MAX_SEGMENTS,)),
-        ("current_A_per_V", _f8, (MAX_SEGMENTS,)),
-        ("current_A_per_N", _f8, (MAX_SEGMENTS,)),
-        ("drop_V", _f8, (MAX_SEGMENTS,)),
-        ("capacity_As", _f8),
-        ("resistance_0_ohm", _f8),
-        ("resistance_th_ohm", _f8),
-        ("time_constant_th_s", _f8),
-        ("polarisation_decay", _f8),
+        *battery.RECORD_FIELDS,
         # thrust correction
         ("faces", _f8, (PHYSICAL_SIDES, 2)),
-        ("speed_N_per_mps", _f8),
-        ("climb_N_per_mps", _f8),
-        ("descent_N_per_mps", _f8),
-        ("tilt_N_per_rad", _f8),
         ("trim_rad_per_mps", _f8),
         ("fitted_trim_rad_per_mps", _f8),
         # the LPV model takes the power of level flight from the rotor model, where that needs more
         # than the fit does
         ("rotor_power", "?"),
-        # limits
-        ("v_xy_max_mps", _f8),
-        ("v_up_max_mps", _f8),
-        ("v_down_max_mps", _f8),
-        ("tilt_max_rad", _f8),
-        ("rate_max_radps", _f8),
-        ("lift_min_N", _f8),
-        ("lift_max_N", _f8),
-        ("delta_thrust_min_N", _f8),
         ("torque_max_Nm", _f8, (3,)),
-        ("alpha_xy_max_radps2", _f8),
-        ("alpha_z_max_radps2", _f8),
-        ("yaw_rate_max_radps", _f8),
         # a UAS that looks where it flies, see `layout`; the arena says which do
         ("follows_course", "?"),
         # what a sample must not exceed, see `limits`
@@ -111,29 +84,9 @@ VEHICLE_DTYPE = record_dtype(
         ("n_governor_rows", _i8),
         # row by row side by side, so that a processor takes several at a time; zero beyond
         ("governor_rows", _f8, (N_ROW_COLUMNS, MAX_GOVERNOR_ROWS)),
-        # nonlinear plant
-        ("n_motors", _i8),
         # motor thrusts from (thrust, torques), and torques from each motor's thrust
         ("mixer", _f8, (MAX_MOTORS, N_MIXED)),
         ("rotor_map", _f8, (MAX_MOTORS, 3)),
-        ("drag_kgps", _f8),
-        ("drag_vertical_kgps", _f8),
-        ("gravity_mps2", _f8),
-        ("arm_m", _f8),
-        ("thrust_N_per_radps2", _f8),
-        ("torque_Nm_per_radps2", _f8),
-        ("propeller_radius_m", _f8),
-        ("induced_power_factor", _f8),
-        ("profile_power_advance_factor", _f8),
-        ("air_density_kgpm3", _f8),
-        ("motor_speed_max_radps", _f8),
-        ("back_emf_Vs_per_rad", _f8),
-        ("motor_resistance_ohm", _f8),
-        ("no_load_current_A", _f8),
-        ("esc_loss_W", _f8),
-        ("esc_efficiency", _f8),
-        ("auxiliary_W", _f8),
-        ("hover_W", _f8),
     ]
 )
 """A vehicle at one sampling time."""
@@ -152,51 +105,27 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     Raises:
         ValueError: dt_s out of range, or limits that no inner loop can keep.
     """
-    check_step(dt_s)
+    battery.check_step(dt_s)
     if dt_s < _DT_MIN_S:
         raise ValueError(f"dt_s is {dt_s}; the vehicle's inner loop needs {_DT_MIN_S} s at least")
     record = np.zeros(1, VEHICLE_DTYPE)
-    battery, limits = vehicle.battery, vehicle.limits
     A, B = taylor(*rigid_body(vehicle), dt_s, ORDER)
     record["dt_s"] = dt_s
     record["axis_A"], record["axis_B"] = horizontal_axis(vehicle, dt_s)
-    record["vertical_A"] = A[np.ix_([Z, VZ], [Z, VZ])]
-    record["vertical_B"] = B[[Z, VZ], LIFT]
+    record["vertical_A"] = A[np.ix_([S.Z, S.VZ], [S.Z, S.VZ])]
+    record["vertical_B"] = B[[S.Z, S.VZ], S.LIFT]
     record["horizontal_force_B"] = horizontal_force(vehicle, dt_s)
     record["yaw_B"] = 0.5 * dt_s * dt_s, dt_s
-    for name, value in vehicle.kernel_scalars().items():
+    scalars = vehicle.kernel_scalars() | vehicle.thrust_correction.in_record()
+    for name, value in (scalars | vehicle.limits.in_record()).items():
         record[name] = value
     record["inertia_kgm2"] = vehicle.airframe.inertia_kgm2
-    segments = battery_segments(vehicle)
-    record["n_segments"] = len(segments)
-    for row, segment in enumerate(segments):
-        for name, value in segment._asdict().items():
-            record[name][0, row] = value
-    record["capacity_As"] = 3600.0 * battery.capacity_Ah
-    for name in ("resistance_0_ohm", "resistance_th_ohm", "time_constant_th_s"):
-        record[name] = getattr(battery, name)
-    record["polarisation_decay"] = polarisation_decay(vehicle, dt_s)
+    battery.write_battery(record, vehicle, dt_s)
     record["faces"] = cylinder_faces(PHYSICAL_SIDES)[:, :2]
-    for name, value in vehicle.thrust_correction:
-        record[name] = value
     record["trim_rad_per_mps"] = vehicle.trim_tilt_rad_per_mps
     record["fitted_trim_rad_per_mps"] = vehicle.trim_tilt_rad_per_mps
     record["thrust_factor"] = record["power_factor"] = 1.0
-    for name in (
-        "v_xy_max_mps",
-        "v_up_max_mps",
-        "v_down_max_mps",
-        "tilt_max_rad",
-        "rate_max_radps",
-        "lift_min_N",
-        "lift_max_N",
-        "delta_thrust_min_N",
-    ):
-        record[name] = getattr(limits, name)
     record["torque_max_Nm"] = vehicle.torque_max_Nm
-    record["alpha_xy_max_radps2"] = limits.angular_acceleration_xy_max_radps2
-    record["alpha_z_max_radps2"] = limits.angular_acceleration_z_max_radps2
-    record["yaw_rate_max_radps"] = limits.yaw_rate_max_radps
     record["bounds"] = bounds_of(vehicle)
     gain, rows, record["reference_max_mps"] = design_velocity_loop(vehicle, float(dt_s))
     if len(rows) > MAX_GOVERNOR_ROWS:
@@ -207,7 +136,6 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     torques = _rotor_map(vehicle)
     record["rotor_map"][0, : len(torques)] = torques
     record["mixer"][0, : len(torques)] = _mixer(torques)
-    record["hover_W"] = vehicle.power.hover_W
     return record.reshape(())
 
 
@@ -215,8 +143,8 @@ def horizontal_force(vehicle: VehicleParams, dt_s: float) -> NDArray[np.float64]
     """(2,) what a horizontal force of 1 N, held over a step, adds to position and velocity."""
     A, B = rigid_body(vehicle)
     B = np.zeros_like(B[:, :1])
-    B[VX] = 1.0 / vehicle.airframe.mass_kg
-    return taylor(A, B, dt_s, ORDER)[1][[X, VX], 0]
+    B[S.VX] = 1.0 / vehicle.airframe.mass_kg
+    return taylor(A, B, dt_s, ORDER)[1][[S.X, S.VX], 0]
 
 
 def _rotor_map(vehicle: VehicleParams) -> NDArray[np.float64]:

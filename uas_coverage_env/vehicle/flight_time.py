@@ -1,11 +1,16 @@
 """How long and how far a vehicle flies on its own battery, in still air."""
 
-import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 from uas_coverage_env.vehicle import derived
-from uas_coverage_env.vehicle.battery import BatterySegment, battery_current_A, battery_segments
+from uas_coverage_env.vehicle.battery import (
+    BatterySegment,
+    BatteryState,
+    battery_current_A,
+    battery_segments,
+    steady_current_A,
+)
 from uas_coverage_env.vehicle.params import VehicleParams
 from uas_coverage_env.vehicle.thrust_correction import level_flight_N
 
@@ -58,7 +63,7 @@ def endurance(vehicle: VehicleParams) -> Endurance:
     exact_N = vehicle.weight_N + level_flight_N(vehicle, speed_mps)
     return Endurance(
         thrust_to_weight=vehicle.thrust_max_N / vehicle.weight_N,
-        hover_current_A=derived.steady_current_A(battery, battery.dod_max, power.hover_W),
+        hover_current_A=steady_current_A(battery, battery.dod_max, power.hover_W),
         hover_min=flight_time_s(vehicle, power.hover_W, 1.0) / 60.0,
         hover_usable_min=flight_time_s(vehicle, power.hover_W, battery.dod_max) / 60.0,
         cruise_lpv=cruise(power.hover_W + power.slope_W_per_N * extra_N),
@@ -90,9 +95,9 @@ def flight_time_s(vehicle: VehicleParams, power_W: float, dod_end: float) -> flo
     """
     resistance_ohm = vehicle.battery.resistance_0_ohm
 
-    def current_A(segment: BatterySegment, dod: float, u_th_V: float) -> float:
-        voltage_V = segment.ocv_V - segment.ocv_slope_V * dod - u_th_V
-        return battery_current_A(voltage_V, resistance_ohm, power_W)
+    def current_A(segment: BatterySegment, state: BatteryState) -> float:
+        open_V = segment.ocv_V - segment.ocv_slope_V * state.dod
+        return battery_current_A(open_V - sum(state.pairs_V), resistance_ohm, power_W)
 
     return _time_s(vehicle, current_A, dod_end)
 
@@ -105,8 +110,8 @@ def linearised_hover_time_s(vehicle: VehicleParams, dod_end: float) -> float:
         dod_end: depth of discharge at which the time ends, in (0, 1].
     """
 
-    def current_A(segment: BatterySegment, dod: float, u_th_V: float) -> float:
-        drop_V = segment.ocv_slope_V * dod + u_th_V - segment.drop_V
+    def current_A(segment: BatterySegment, state: BatteryState) -> float:
+        drop_V = segment.ocv_slope_V * state.dod + sum(state.pairs_V) - segment.drop_V
         return segment.current_A + segment.current_A_per_V * drop_V
 
     return _time_s(vehicle, current_A, dod_end)
@@ -114,20 +119,19 @@ def linearised_hover_time_s(vehicle: VehicleParams, dod_end: float) -> float:
 
 def _time_s(
     vehicle: VehicleParams,
-    current_A: Callable[[BatterySegment, float, float], float],
+    current_A: Callable[[BatterySegment, BatteryState], float],
     dod_end: float,
 ) -> float:
-    """Steps of the Thevenin battery under the current of its state."""
+    """Steps of the battery under the current of its state, the last of a segment up to its end."""
     battery = vehicle.battery
-    decay = math.exp(-_STEP_S / battery.time_constant_th_s)
-    dod = u_th_V = time_s = 0.0
+    state, time_s = BatteryState.rested(battery, 0.0), 0.0
     for segment in battery_segments(vehicle):
         end = min(segment.dod_end, dod_end)
-        while dod < end:
-            current = current_A(segment, dod, u_th_V)
-            rate = current / (3600.0 * battery.capacity_Ah)
-            step_s = min(_STEP_S, (end - dod) / rate)
-            dod = dod + step_s * rate if step_s == _STEP_S else end
+        while state.dod < end:
+            current = current_A(segment, state)
+            step_s = min(_STEP_S, (end - state.dod) * 3600.0 * battery.capacity_Ah / current)
+            state = state.after(battery, current, step_s)
+            if step_s < _STEP_S:
+                state = state._replace(dod=end)
             time_s += step_s
-            u_th_V = decay * u_th_V + (1.0 - decay) * battery.resistance_th_ohm * current
     return time_s
