@@ -8,7 +8,7 @@ import pytest
 from uas_coverage_env.autopilot import return_mode
 from uas_coverage_env.env.observation import home
 from uas_coverage_env.planning import reserves
-from uas_coverage_env.scenario import endurance
+from uas_coverage_env.scenario import feasibility
 from uas_coverage_env.vehicle import range as flight_time
 from uas_coverage_env.vehicle.range import (
     SpeedLimits,
@@ -21,7 +21,7 @@ from uas_coverage_env.vehicle.range import (
 SPEEDS = SpeedLimits(level_mps=10.0, climb_mps=3.0, descent_mps=2.0)
 MODELS = {
     name: value
-    for module in (flight_time, return_mode, home, endurance, reserves)
+    for module in (flight_time, return_mode, home, feasibility, reserves)
     for name, value in vars(module).items()
     if isinstance(value, TravelTimeModel)
 }
