@@ -38,5 +38,5 @@ def ctrl_c_ends_the_program() -> Iterator[None]:
 
 def _is_running() -> bool:
     """Whether this process is `uas-coverage` or `python -m uas_coverage_env`."""
-    name = os.path.basename(sys.argv[0]).removesuffix(".exe")
+    name = os.path.basename("".join(sys.argv[:1])).removesuffix(".exe")
     return name == _NAME or sys.orig_argv[1:3] == ["-m", "uas_coverage_env"]

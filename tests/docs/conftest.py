@@ -6,6 +6,10 @@ import sys
 import pytest
 from markdown_blocks import ROOT
 
+# the scripts of the documentation import each other from their folder
+if str(ROOT / "docs") not in sys.path:
+    sys.path.append(str(ROOT / "docs"))
+
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
