@@ -53,14 +53,6 @@ NOT_FINITE = Disturbance("not_finite", _not_finite)
 
 
 @kernel
-def _returns(arena, state, outcome, i, parameters, memory, random):
-    return 1.0
-
-
-RETURNS = Disturbance("returns", _returns)
-
-
-@kernel
 def _perturb(arena, state, outcome, i, parameters, memory, random):
     if state.step[0] == 0:
         perturb(arena, state, i, parameters)

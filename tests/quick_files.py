@@ -36,7 +36,7 @@ QUICK = {
     "conformance/test_gymnasium.py": (
         "but test_stable_baselines_finds_nothing_wrong test_gymnasium_finds_nothing_wrong"
     ),
-    "disturbances/test_disturbances_in_the_world.py": "",
+    "features/test_disturbances_in_the_world.py": "",
     "docs/test_rules.py": "",
     "docs/test_tables.py": "",
     "draw/test_labels.py": "",

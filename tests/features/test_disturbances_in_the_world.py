@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from own_disturbances import NOT_FINITE, RETURNS, gusts, push, weak_rotors
+from own_disturbances import NOT_FINITE, gusts, push, weak_rotors
 from small_worlds import meadow, waypoint
 
 from uas_coverage_env import World
@@ -241,7 +241,6 @@ def test_what_is_no_disturbance_is_refused():
         (lambda: push(math.inf, 0.0, 0.0), r"push: parameters\[0\] is inf"),
         (lambda: Disturbance("", None), "give it a name"),
         (lambda: World(meadow(), seed=-1), "seed is -1"),
-        (lambda: flown(World(meadow(), disturbances=(RETURNS,)), 1), "_returns cannot be compiled"),
         (lambda: pool_worlds([windy(meadow(), mean_mps=1.0, from_deg=0.0)]), "the air is still"),
         (lambda: pool_worlds([meadow(waypoints=(again,))]), "again_after_s"),
     ]

@@ -47,7 +47,7 @@ def read(*events: dict[str, Any]) -> Scenario:
 
 def test_every_kind_is_read_and_written_as_it_was(tmp_path):
     scenario = read(*ONE_OF_EACH)
-    assert [type(event) for event in scenario.events] == list(EVENT_KINDS)
+    assert {type(event) for event in scenario.events} == set(EVENT_KINDS)
     scenario.to_file(tmp_path / "eventful.toml")
     assert load_scenario(tmp_path / "eventful.toml") == scenario
 
@@ -75,8 +75,8 @@ def test_no_planner_is_told_of_what_will_happen():
     [
         ({"kind": "uas_lost"}, "events[0]: happens at_s or at a rate_per_h; give one of the two"),
         ({"kind": "uas_lost", "at_s": 1, "rate_per_h": 1}, "events[0]: happens at_s or at a rate"),
-        ({"kind": "fire", "at_s": 1}, "events[0].kind: there is no 'fire'; take one of uas_lost, "),
-        ({"at_s": 1}, "events[0].kind: is missing; take one of uas_lost, radio_lost"),
+        ({"kind": "fire", "at_s": 1}, "events[0].kind: there is no 'fire'; take one of "),
+        ({"at_s": 1}, "events[0].kind: is missing; take one of "),
         (
             {"kind": "uas_lost", "at_s": 1, "usa": "x"},
             "events[0].usa: unknown key; did you mean uas",

@@ -11,9 +11,9 @@ from uas_coverage_env.features.feature import DISTURBANCE_MEMORY, Disturbance, F
 from uas_coverage_env.features.gusts import discrete_gusts, random_gusts
 from uas_coverage_env.features.of_scenario import disturbances_of
 from uas_coverage_env.features.parameter_errors import uncertainty
+from uas_coverage_env.features.steady_wind import constant_wind, mean_wind, wind_velocity_mps
 from uas_coverage_env.features.table import DisturbanceTable, FeatureTable
 from uas_coverage_env.features.true_vehicles import perturb
-from uas_coverage_env.features.wind import constant_wind, mean_wind, wind_velocity_mps
 
 __all__ = [
     "DISTURBANCE_MEMORY",

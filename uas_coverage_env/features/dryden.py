@@ -12,11 +12,12 @@ height and airspeed may change from step to step and the turbulence stays statio
 """
 
 import math
+from typing import Any
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.random import normal
 from uas_coverage_env.features.feature import Disturbance
-from uas_coverage_env.features.wind import Wind, mean_wind_mps, wind_velocity_mps
+from uas_coverage_env.features.steady_wind import mean_wind_mps, wind_velocity_mps
 from uas_coverage_env.vehicle import VX, Z
 
 FOOT_M = 0.3048
@@ -110,7 +111,7 @@ def swirl(arena, state, outcome, i, parameters, memory, random):
     event.wind_mps[2] += sigma_w * _cut(second_order_output(memory, _VERTICAL))
 
 
-def turbulence(wind: Wind) -> Disturbance:
+def turbulence(wind: Any) -> Disturbance:
     """The turbulence of the wind of a scenario, of its own for each UAS."""
     at_20_ft_mps = mean_wind_mps(wind, 20.0 * FOOT_M)
     north, east, _ = wind_velocity_mps(1.0, wind.from_deg)

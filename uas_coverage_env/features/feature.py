@@ -166,7 +166,6 @@ class Disturbance(Feature):
 def _on_each(act: Any) -> Any:
     """The kernel of a disturbance at the point ACT."""
 
-    @kernel
     def act_on_each(arena, state, outcome, f):
         own = arena.features[f]
         parameters = _parameters_of(arena.feature_words, own.first, own.n)
@@ -178,7 +177,8 @@ def _on_each(act: Any) -> Any:
                     memory[i].random[:],
                 )  # fmt: skip
 
-    return act_on_each
+    act_on_each.__name__ = getattr(act, "__name__", repr(act))  # in messages
+    return kernel(act_on_each)
 
 
 @kernel

@@ -4,11 +4,12 @@ Over a step the air has the mean of the gust over it, so that no gust is missed 
 """
 
 import math
+from typing import Any
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.random import uniform
 from uas_coverage_env.features.feature import Disturbance
-from uas_coverage_env.features.wind import Wind, wind_velocity_mps
+from uas_coverage_env.features.steady_wind import wind_velocity_mps
 
 _FULL_TURN = 2.0 * math.pi
 _AT_S, _LASTS_S, _PEAK, _PER_GUST = 0, 1, 2, 5  # parameters of each gust; its peak is NED
@@ -64,7 +65,7 @@ def gust_at_random(arena, state, outcome, i, parameters, memory, random):
             memory[_BLOWS] = 0.0
 
 
-def discrete_gusts(wind: Wind) -> Disturbance:
+def discrete_gusts(wind: Any) -> Disturbance:
     """The gusts of a scenario's wind that have a time."""
     parameters: list[float] = []
     for each in wind.gusts:
@@ -73,7 +74,7 @@ def discrete_gusts(wind: Wind) -> Disturbance:
     return Disturbance("discrete_gusts", gust, tuple(parameters))
 
 
-def random_gusts(wind: Wind) -> Disturbance:
+def random_gusts(wind: Any) -> Disturbance:
     """The gusts of a scenario's wind at random times, the same for all UAS."""
     gusts = wind.random_gusts
     assert gusts is not None

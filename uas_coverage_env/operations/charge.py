@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uas_coverage_env.features.wind import mean_wind_mps
+from uas_coverage_env.features.steady_wind import mean_wind_mps
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.mission.leg_model import Followed
 from uas_coverage_env.operations.homeward import Homeward
