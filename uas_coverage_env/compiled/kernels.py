@@ -175,8 +175,7 @@ def _prefetched(array):
         _prefetch_line(array, at)
 
 
-@intrinsic
-def _prefetch_line(typing_context, array, at):
+def _line_fetched(typing_context, array, at):
     """Fetch the line `at` bytes (int64) behind the beginning of an array."""
 
     def generate(context, builder, signature, arguments):
@@ -192,7 +191,10 @@ def _prefetch_line(typing_context, array, at):
     return types.none(array, types.int64), generate
 
 
+_prefetch_line: Any = intrinsic(_line_fetched)
+
 if COMPILED:
-    lowest_bit, rarely, prefetch = _trailing_zeros, _expected_false, inlined_kernel(_prefetched)
+    made: Any = (_trailing_zeros, _expected_false, inlined_kernel(_prefetched))
+    lowest_bit, rarely, prefetch = made
     stack_array = _on_the_stack(types.float64, ir.DoubleType())
     stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())

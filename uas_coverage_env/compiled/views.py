@@ -295,7 +295,8 @@ def _without_owners(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         array = parts_of(context, builder, kind, value)
         start = builder.bitcast(array.data, context.get_value_type(types.voidptr))
         return array_at(context, builder, kind, start, array.shape)
-    for k, each in enumerate(kind if isinstance(kind, types.BaseTuple) else ()):
+    parts: Any = kind if isinstance(kind, types.BaseTuple) else ()
+    for k, each in enumerate(parts):
         part = _without_owners(context, builder, each, builder.extract_value(value, k))
         value = builder.insert_value(value, part, k)
     return value
