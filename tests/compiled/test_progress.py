@@ -12,7 +12,6 @@ from uas_coverage_env.compiled.progress import (
     COMPILATIONS,
     NOTICE,
     Compilations,
-    called_by,
     compiling_for,
     listening,
 )
@@ -141,11 +140,6 @@ def test_a_compilation_that_fails_has_an_end_too():
     with listening(shares.append), pytest.raises(Exception, match="nothing"):
         wrong(1.0)
     assert shares[-1] is None
-
-
-def test_the_kernels_of_a_kernel_are_counted_through_names_and_cells():
-    assert called_by(first) == {second, third}
-    assert called_by(fresh()) > {second, third}
 
 
 def test_patience_counts_what_earlier_compilations_took(monkeypatch):

@@ -221,8 +221,9 @@ class _Part(JITCodeLibrary):
     def set_env(self, name: str, environment: Any) -> None:
         """Define the variable of an environment, which machine code would."""
         variable = binding.parse_assembly(f'@"{name}" = common global i8* null')
-        self._codegen._add_module(variable)
-        self._codegen.set_env(name, environment)
+        codegen: Any = self._codegen
+        codegen._add_module(variable)
+        codegen.set_env(name, environment)
 
     def serialize_using_object_code(self) -> Any:
         """As `_PartCacheImpl` reads it."""
@@ -239,9 +240,9 @@ class _Part(JITCodeLibrary):
 class _PartCacheImpl(CompileResultCacheImpl):
     """How parts are read from the disk."""
 
-    def rebuild(self, target_context: Any, reduced_data: Any) -> Any:
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
         """A part from what numba has made of it."""
-        code, descriptor, environment, signature, *_, begin, others = reduced_data
+        code, descriptor, environment, signature, *_, begin, others = payload
         for function in begin:
             function()
         part = _Part.read(target_context.codegen(), *code)

@@ -127,14 +127,12 @@ def lowest_bit(bits: int) -> int:
     return (int(bits) & -int(bits)).bit_length() - 1
 
 
-def _trailing_zeros() -> Any:
-    def make(typing_context, bits):
-        def generate(context, builder, signature, arguments):
-            return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
+@intrinsic
+def _trailing_zeros(typing_context, bits):
+    def generate(context, builder, signature, arguments):
+        return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
 
-        return types.int64(types.int64), generate
-
-    return intrinsic(make)
+    return types.int64(types.int64), generate
 
 
 def rarely(condition: bool) -> bool:
@@ -149,20 +147,17 @@ def rarely(condition: bool) -> bool:
     return condition
 
 
-def _expected_false() -> Any:
-    def make(typing_context, condition):
-        def generate(context, builder, signature, arguments):
-            bit = ir.IntType(1)
-            (given,) = arguments
-            given = builder.icmp_unsigned("!=", given, given.type(0))
-            expect = builder.module.declare_intrinsic(
-                "llvm.expect", [bit], ir.FunctionType(bit, [bit, bit])
-            )
-            return builder.call(expect, [given, bit(0)])
+@intrinsic
+def _expected_false(typing_context, condition):
+    def generate(context, builder, signature, arguments):
+        (given,), bit = arguments, ir.IntType(1)
+        given = builder.icmp_unsigned("!=", given, given.type(0))
+        kind = ir.FunctionType(bit, [bit, bit])
+        return builder.call(
+            builder.module.declare_intrinsic("llvm.expect", [bit], kind), [given, bit(0)]
+        )
 
-        return types.boolean(condition), generate
-
-    return intrinsic(make)
+    return types.boolean(condition), generate
 
 
 def prefetch(array: NDArray[Any]) -> None:
@@ -180,8 +175,7 @@ def _prefetched(array):
         _prefetch_line(array, at)
 
 
-@intrinsic
-def _prefetch_line(typing_context, array, at):
+def _line_fetched(typing_context, array, at):
     """Fetch the line `at` bytes (int64) behind the beginning of an array."""
 
     def generate(context, builder, signature, arguments):
@@ -197,8 +191,10 @@ def _prefetch_line(typing_context, array, at):
     return types.none(array, types.int64), generate
 
 
+_prefetch_line: Any = intrinsic(_line_fetched)
+
 if COMPILED:
-    lowest_bit = _trailing_zeros()
-    rarely, prefetch = _expected_false(), inlined_kernel(_prefetched)
+    made: Any = (_trailing_zeros, _expected_false, inlined_kernel(_prefetched))
+    lowest_bit, rarely, prefetch = made
     stack_array = _on_the_stack(types.float64, ir.DoubleType())
     stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())

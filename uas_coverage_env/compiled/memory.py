@@ -76,7 +76,7 @@ class Field:
     axes: tuple[Axis, ...]
     values: Mapping[str, Values]
 
-    def shape(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
+    def shape(self, sizes: Mapping[Any, Any]) -> tuple[Any, ...]:
         """Its shape where the named sizes are known."""
         return tuple(sizes[axis] if isinstance(axis, str) else axis for axis in self.axes)
 

@@ -20,8 +20,8 @@ NOTICE = "compiling for {purpose}: up to a minute, and kept on disk for later ru
 PATIENCE_S = 1.0
 """A process that compiles no longer than this says nothing."""
 
-_SHARE_OF_PARTS = 0.75
-"""What the kernels of a step take; then their machine code is made, all at once."""
+_LEFT_BY_A_KERNEL = 0.98
+"""Share of what is left to do that is left after one more kernel: a step has some hundred."""
 
 Listener = Callable[[float | None], object]
 """Called with the share of a compilation that is done, in [0, 1], and with None at its end."""
@@ -50,6 +50,8 @@ def _say_it_once() -> Listener:
 class Compilations(event.Listener):
     """What a process compiles, as numba tells: kernels, and the kernels that they call.
 
+    How many there are is not known before; a share says that it goes on.
+
     Attributes:
         listener: Told once the process has spent more than PATIENCE_S.
         purpose: What they are for, in words.
@@ -61,17 +63,15 @@ class Compilations(event.Listener):
         self.purpose = "this program"
         self.n_compiled = 0
         self.spent_s = self._since_s = 0.0
-        self._depth = self._n_made = self._n_parts = 0
+        self._depth = self._n_made = 0
 
     def on_start(self, event: Any) -> None:
         """A kernel that is not on the disk is compiled."""
-        kernel = event.data["dispatcher"]
-        if isinstance(kernel, KernelDispatcher | MachineCode):
+        if isinstance(event.data["dispatcher"], KernelDispatcher | MachineCode):
             self.n_compiled += 1
             self._depth += 1
             if self._depth == 1:
                 self._since_s, self._n_made = time.perf_counter(), 0
-                self._n_parts = max(len(called_by(kernel)), 1)
             self._tell()
 
     def on_end(self, event: Any) -> None:
@@ -85,22 +85,7 @@ class Compilations(event.Listener):
 
     def _tell(self) -> None:
         if self.spent_s + time.perf_counter() - self._since_s > PATIENCE_S:
-            share = _SHARE_OF_PARTS * min(self._n_made / self._n_parts, 1.0)
-            self.listener(share if self._depth else None)
-
-
-def called_by(kernel: Any) -> set[KernelDispatcher]:
-    """All kernels that a kernel calls by their names, directly or not."""
-    reached: set[KernelDispatcher] = set()
-    found = [kernel]
-    while found:
-        function = found.pop().py_func
-        cells = (cell.cell_contents for cell in function.__closure__ or ())
-        named = (function.__globals__.get(name) for name in function.__code__.co_names)
-        called = {one for one in (*named, *cells) if isinstance(one, KernelDispatcher)} - reached
-        reached |= called
-        found += called
-    return reached
+            self.listener(1.0 - _LEFT_BY_A_KERNEL**self._n_made if self._depth else None)
 
 
 COMPILATIONS = Compilations()

@@ -263,45 +263,37 @@ class Handover:
     def __init__(self, example: Callable[[], Any]) -> None:
         self._example = example
         self._kept: dict[int, Any] = {}
-        self.keep = _in_kernels(self._typed_keep(), self._plain_keep)
-        self.take = _in_kernels(self._typed_take(), self._plain_take)
+        self.keep = _in_kernels(self._typed_keep, self._plain_keep)
+        self.take = _in_kernels(self._typed_take, self._kept.__getitem__)
 
     @cached_property
     def _type(self) -> Any:
         return typeof(self._example())
 
     def _plain_keep(self, value: Any) -> int:
-        self._kept = {id(value): value}
+        self._kept.clear()
+        self._kept[id(value)] = value
         return id(value)
 
-    def _plain_take(self, number: int) -> Any:
-        return self._kept[number]
+    def _typed_keep(self, typing_context, value):
+        if value != self._type:
+            raise TypeError(f"a parallel loop is handed {value}, not {self._type}")
 
-    def _typed_keep(self) -> Callable[..., Any]:
-        def typed(typing_context, value):
-            if value != self._type:
-                raise TypeError(f"a parallel loop is handed {value}, not {self._type}")
+        def generate(context, builder, signature, arguments):
+            owned_by_none = _without_owners(context, builder, value, arguments[0])
+            with builder.goto_entry_block():
+                place = builder.alloca(owned_by_none.type)
+            builder.store(owned_by_none, place)
+            return builder.ptrtoint(place, context.get_value_type(types.int64))
 
-            def generate(context, builder, signature, arguments):
-                owned_by_none = _without_owners(context, builder, value, arguments[0])
-                with builder.goto_entry_block():
-                    place = builder.alloca(owned_by_none.type)
-                builder.store(owned_by_none, place)
-                return builder.ptrtoint(place, context.get_value_type(types.int64))
+        return types.int64(value), generate
 
-            return types.int64(value), generate
+    def _typed_take(self, typing_context, number):
+        def generate(context, builder, signature, arguments):
+            kind = context.get_value_type(self._type).as_pointer()
+            return builder.load(builder.inttoptr(arguments[0], kind))
 
-        return typed
-
-    def _typed_take(self) -> Callable[..., Any]:
-        def typed(typing_context, number):
-            def generate(context, builder, signature, arguments):
-                kind = context.get_value_type(self._type).as_pointer()
-                return builder.load(builder.inttoptr(arguments[0], kind))
-
-            return self._type(types.int64), generate
-
-        return typed
+        return self._type(types.int64), generate
 
 
 def _without_owners(context: Any, builder: Any, kind: Any, value: Any) -> Any:
@@ -310,7 +302,8 @@ def _without_owners(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         array = parts_of(context, builder, kind, value)
         start = builder.bitcast(array.data, context.get_value_type(types.voidptr))
         return array_at(context, builder, kind, start, array.shape)
-    for k, each in enumerate(kind if isinstance(kind, types.BaseTuple) else ()):
+    parts: Any = kind if isinstance(kind, types.BaseTuple) else ()
+    for k, each in enumerate(parts):
         part = _without_owners(context, builder, each, builder.extract_value(value, k))
         value = builder.insert_value(value, part, k)
     return value
