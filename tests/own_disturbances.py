@@ -60,9 +60,8 @@ def _perturb(arena, state, outcome, i, parameters, memory, random):
 
 def perturbed(**perturbations):
     """A vehicle that is another than is believed; by name, 0 where not named."""
-    names = [perturbation.name for perturbation in PERTURBATIONS]
-    assert set(perturbations) <= set(names)
-    parameters = tuple(float(perturbations.get(name, 0.0)) for name in names)
+    assert set(perturbations) <= set(PERTURBATIONS)
+    parameters = tuple(float(perturbations.get(name, 0.0)) for name in PERTURBATIONS)
     return Disturbance("perturbed", _perturb, parameters, perturbs=True)
 
 

@@ -173,7 +173,7 @@ def test_a_small_perturbation_changes_little():
     ends = {}
     for dynamics in ("lpv", "nonlinear"):
         for size in (0.0, 1e-9):
-            every = dict.fromkeys((p.name for p in PERTURBATIONS), size)
+            every = dict.fromkeys(PERTURBATIONS, size)
             world = World(meadow(HIGH), dynamics=dynamics, disturbances=(perturbed(**every),))
             ends[dynamics, size], outcomes = flown(world)
         np.testing.assert_allclose(ends[dynamics, 0.0], ends[dynamics, 1e-9], atol=1e-6)

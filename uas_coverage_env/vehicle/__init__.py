@@ -81,7 +81,6 @@ from uas_coverage_env.vehicle.true_vehicle import (
     POWER,
     RESISTANCE,
     THRUST,
-    Perturbation,
     write_true_vehicle,
 )
 
@@ -122,7 +121,6 @@ __all__ = [
     "Endurance",
     "LinearModel",
     "MadeVehicle",
-    "Perturbation",
     "RcPair",
     "VehicleParams",
     "X",

@@ -92,8 +92,8 @@ def write_true_battery(nominal, true, more_power, more_capacity, more_resistance
         behind = nominal.ocv_V[j] - nominal.drop_V[j]
         hover = _current(behind, true.resistance_0_ohm, true.hover_W)
         stiffness = behind - 2.0 * true.resistance_0_ohm * hover
-        believed = behind - 2.0 * nominal.resistance_0_ohm * nominal.current_A[j]
+        stiffness_nominal = behind - 2.0 * nominal.resistance_0_ohm * nominal.current_A[j]
         true.current_A[j] = hover
         true.current_A_per_V[j] = hover / stiffness
-        slope_W_per_N = more_power * believed * nominal.current_A_per_N[j]
+        slope_W_per_N = more_power * stiffness_nominal * nominal.current_A_per_N[j]
         true.current_A_per_N[j] = slope_W_per_N / stiffness

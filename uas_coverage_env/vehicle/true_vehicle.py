@@ -8,34 +8,15 @@ another power.
 """
 
 import math
-from typing import NamedTuple
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel, stack_array
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.discharge import write_true_battery
 
-
-class Perturbation(NamedTuple):
-    """A parameter in which the true vehicle may differ from the nominal one.
-
-    Attributes:
-        name: In messages and tables.
-        meaning: What is another.
-    """
-
-    name: str
-    meaning: str
-
-
-PERTURBATIONS = (
-    Perturbation("mass", "mass and weight"),
-    Perturbation("thrust", "thrust of the motors at the same speed"),
-    Perturbation("drag", "drag, horizontal and vertical"),
-    Perturbation("power", "electrical power at the same speed of the motors, avionics included"),
-    Perturbation("capacity", "capacity of the battery"),
-    Perturbation("resistance", "internal resistances of the battery"),
-)
-"""The place of a parameter is its index in the `perturbation` of a record."""
+PERTURBATIONS = ("mass", "thrust", "drag", "power", "capacity", "resistance")
+"""Parameters in which the true vehicle may differ from the nominal one; the place of each is its
+index in the `perturbation` of a record. Thrust and power are those at the same speed of the motors,
+avionics included; drag is horizontal and vertical; resistance that of the whole battery."""
 
 N_PERTURBATIONS = len(PERTURBATIONS)
 MASS, THRUST, DRAG, POWER, CAPACITY, RESISTANCE = range(N_PERTURBATIONS)
