@@ -9,7 +9,7 @@ import types
 from collections import namedtuple
 from concurrent.futures import ThreadPoolExecutor
 from enum import Enum
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -284,7 +284,7 @@ def made(name: str, **values: object) -> types.ModuleType:
     return module
 
 
-KNOWN = {
+KNOWN: dict[str, Any] = {
     "np": np,
     "made": made,
     "cache": cache,
@@ -308,6 +308,18 @@ def test_every_value_that_a_kernel_names_makes_another_kernel(name):
     assert None not in digests
     assert len(set(digests)) == len(digests)
     assert digests == [digest_where(name, text) for text in VALUES[name]]
+
+
+def test_what_an_object_has_computed_since_makes_no_other_kernel():
+    class Table:
+        @cached_property
+        def total(self) -> float:
+            return 1.0
+
+    KNOWN["table"] = Table()
+    before = digest_where("one", "table")
+    assert KNOWN["table"].total == 1.0
+    assert digest_where("one", "table") == before is not None
 
 
 def test_what_only_this_process_knows_by_its_address_has_no_digest():

@@ -9,6 +9,7 @@ import hashlib
 import sys
 from collections.abc import Iterator
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -73,7 +74,13 @@ def _described(value: Any, within: tuple[Any, ...]) -> str:
         return f"{kind.__qualname__} {_described(value.__wrapped__, inside)}"
     if _of_a_library(kind) or not hasattr(value, "__dict__"):
         return f"{kind.__qualname__} {value!r}"
-    return f"{kind.__qualname__} {_described(vars(value), inside)}"
+    # what it has computed since says nothing new
+    said = {
+        name: each
+        for name, each in vars(value).items()
+        if not isinstance(getattr(kind, name, None), cached_property)
+    }
+    return f"{kind.__qualname__} {_described(said, inside)}"
 
 
 def _of_a_library(value: Any) -> bool:
