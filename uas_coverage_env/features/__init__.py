@@ -12,13 +12,12 @@ from uas_coverage_env.features.gusts import discrete_gusts, random_gusts
 from uas_coverage_env.features.of_scenario import disturbances_of
 from uas_coverage_env.features.parameter_errors import uncertainty
 from uas_coverage_env.features.steady_wind import constant_wind, mean_wind, wind_velocity_mps
-from uas_coverage_env.features.table import DisturbanceTable, FeatureTable
+from uas_coverage_env.features.table import FeatureTable
 from uas_coverage_env.features.true_vehicles import perturb
 
 __all__ = [
     "DISTURBANCE_MEMORY",
     "Disturbance",
-    "DisturbanceTable",
     "EventTable",
     "Feature",
     "FeatureTable",

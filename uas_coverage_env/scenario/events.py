@@ -41,3 +41,8 @@ Event = Annotated[_Event, Field(discriminator="kind")]
 """A table of any kind: `kind` says which."""
 
 Events = Annotated[tuple[Event, ...], Strict(False), Field(max_length=1000)]
+
+# a kind is found in its own file, and imported from here
+globals().update({kind.__name__: kind for kind in EVENT_KINDS})
+__all__ = ["EVENT_KINDS", "Event", "Events"]
+__all__ += [kind.__name__ for kind in EVENT_KINDS]
