@@ -179,7 +179,7 @@ def test_a_state_of_another_environment_is_refused():
         ("targets", 10**9),
         ("candidates", -2),
         ("step", -(10**9)),
-        ("status", 77),
+        ("uas.status", 77),
         ("x", np.inf),
         ("observation", np.nan),
         ("episode_returns", np.inf),

@@ -101,7 +101,7 @@ def test_restored_lanes_go_on_bit_for_bit():
         ("lanes.targets", -3),
         ("lanes.candidates", 10**12),
         ("state.step", -(10**9)),
-        ("state.status", 77),
+        ("state.uas.status", 77),
         ("state.x", np.nan),
         ("missions", -1),
     ],

@@ -40,7 +40,12 @@ from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.scenes import change_scenes, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.state_dict import by_present_names, check_like
+from uas_coverage_env.env.state_dict import (
+    by_present_names,
+    check_like,
+    fields_of,
+    records_of,
+)
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.simulation import swarm_state
@@ -279,7 +284,7 @@ class CoverageBatch:
         """
         if isinstance(self.pool, DrawnPool):
             self.pool.check_drawn()
-        return {name: array.copy() for name, array in self._changing().items()}
+        return fields_of(self._changing())
 
     def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on where a batch of the same arguments was when its `state_dict` was taken.
@@ -289,7 +294,8 @@ class CoverageBatch:
                 mission of this batch can have.
         """
         own, state = self._changing(), by_present_names(state)
-        check_like(state, own)
+        check_like(state, fields_of(own))
+        state = records_of(state, own)
         drawn, changed = checked(self.pool, state)
         if isinstance(self.pool, DrawnPool):
             self.pool.install(drawn)

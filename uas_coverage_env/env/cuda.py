@@ -35,7 +35,7 @@ from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.env.scenes import SceneChanges, SceneLane, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.state_dict import check_like, check_values
+from uas_coverage_env.env.state_dict import check_like, check_values, fields_of, records_of
 from uas_coverage_env.scenario import Scenario, installed_families
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
@@ -145,7 +145,7 @@ class CudaMissions:
 
     def state_dict(self) -> dict[str, NDArray[Any]]:
         """All that changes from step to step, on the host, by name."""
-        return {name: on_host(array) for name, array in self._changing().items()}
+        return fields_of({name: on_host(array) for name, array in self._changing().items()})
 
     def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on where missions of the same arguments were when their `state_dict` was taken.
@@ -155,7 +155,9 @@ class CudaMissions:
                 mission here can have.
         """
         pool, own = self._pool, self._changing()
-        check_like(state, own)
+        here = {name: on_host(array) for name, array in own.items()}
+        check_like(state, fields_of(here))
+        state = records_of(state, here)
         check_values(state, {"mission": (0, np.iinfo(np.int64).max - 1)})
         scenario = np.zeros(len(state["mission"]), dtype=np.int64)
         _, changed = checked(pool, {**state, "scenario": scenario})

@@ -1,6 +1,6 @@
 """Arrays of a checkpoint that are loaded: checked, since kernels check no index."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -36,13 +36,35 @@ def check_like(state: Mapping[str, NDArray[Any]], own: Mapping[str, NDArray[Any]
             )
 
 
-def _fields(state: Mapping[str, NDArray[Any]]) -> Iterator[tuple[str, NDArray[Any]]]:
-    """The arrays, those of records field by field."""
-    for name, given in state.items():
-        if given.dtype.names is None:
-            yield name, given
+def fields_of(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Copies of the arrays, of records each field as `name.field`: files hold these."""
+    plain: dict[str, NDArray[Any]] = {}
+    for name, array in arrays.items():
+        if array.dtype.names is None:
+            plain[name] = array.copy()
         else:
-            yield from ((f"{name}.{field}", given[field]) for field in given.dtype.names)
+            plain |= {f"{name}.{part}": array[part].copy() for part in array.dtype.names}
+    return plain
+
+
+def records_of(
+    state: Mapping[str, NDArray[Any]], own: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """The arrays of `fields_of` put together as our own are.
+
+    Args:
+        state: See `check_like`.
+        own: Our arrays.
+    """
+    whole: dict[str, NDArray[Any]] = {}
+    for name, array in own.items():
+        if array.dtype.names is None:
+            whole[name] = np.asarray(state[name])
+            continue
+        whole[name] = np.zeros(array.shape, array.dtype)
+        for part in array.dtype.names:
+            whole[name][part] = state[f"{name}.{part}"]
+    return whole
 
 
 def check_values(state: Mapping[str, NDArray[Any]], limits: Limits) -> None:
@@ -51,7 +73,7 @@ def check_values(state: Mapping[str, NDArray[Any]], limits: Limits) -> None:
     Raises:
         ValueError: An array holds such a value; names both.
     """
-    for name, given in _fields(state):
+    for name, given in fields_of(state).items():
         wrong = np.zeros(np.shape(given), dtype=np.bool_)
         if np.issubdtype(given.dtype, np.floating):
             wrong = ~np.isfinite(given)

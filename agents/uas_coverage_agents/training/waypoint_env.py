@@ -28,7 +28,13 @@ from uas_coverage_agents.waypoint.team import (
 )
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.state_dict import Limits, check_like, check_values
+from uas_coverage_env.env.state_dict import (
+    Limits,
+    check_like,
+    check_values,
+    fields_of,
+    records_of,
+)
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world.arena import ARENA
@@ -125,10 +131,12 @@ class WaypointVecEnv(VecEnv):
 
     def state_dict(self) -> dict[str, NDArray]:
         """All that changes, as plain arrays."""
+        return fields_of(self._changing())
+
+    def _changing(self) -> dict[str, NDArray]:
         state = {f"state.{name}": array for name, array in self._states._asdict().items()}
         lanes = {f"lanes.{name}": getattr(self._lanes, name) for name in _KEPT}
-        more = {"account": self._lanes.account, "missions": self._missions}
-        return {name: array.copy() for name, array in {**state, **lanes, **more}.items()}
+        return {**state, **lanes, "account": self._lanes.account, "missions": self._missions}
 
     def load_state_dict(self, state: dict[str, NDArray]) -> None:
         """Go on where `state_dict` was taken.
@@ -136,14 +144,11 @@ class WaypointVecEnv(VecEnv):
         Raises:
             ValueError: It is of another environment, or holds what no mission of this one can.
         """
-        check_like(state, self.state_dict())
+        own = self._changing()
+        check_like(state, fields_of(own))
         check_values(state, self._limits(state["lanes.scenario"]))
-        for name in self._states._fields:
-            getattr(self._states, name)[:] = state[f"state.{name}"]
-        for name in _KEPT:
-            getattr(self._lanes, name)[:] = state[f"lanes.{name}"]
-        self._lanes.account[:] = state["account"]
-        self._missions[:] = state["missions"]
+        for name, array in records_of(state, own).items():
+            own[name][:] = array
 
     def _limits(self, scenario: NDArray[np.int64]) -> Limits:
         """What the indices may be of lanes that fly these scenarios."""
