@@ -40,7 +40,7 @@ from uas_coverage_env.env.observe import observing_of
 from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.scenes import change_scenes, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.state_dict import by_present_names, check_like
+from uas_coverage_env.env.state_dict import as_numbers, by_present_names, check_like
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.simulation import swarm_state
@@ -302,7 +302,7 @@ class CoverageBatch:
 
     def _changing(self) -> dict[str, NDArray[Any]]:
         parts = (self.worlds, self.learners, self.lanes)
-        arrays = {k: v for part in parts for k, v in part._asdict().items()}
+        arrays = {k: as_numbers(v) for part in parts for k, v in part._asdict().items()}
         del arrays["scene"]  # it follows from the others
         if not self.pool.changes:
             del arrays["changes"]

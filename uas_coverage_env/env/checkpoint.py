@@ -13,7 +13,7 @@ from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.scenes import scenes_in
 from uas_coverage_env.env.state_dict import check_values
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle.record import COUNTS
+from uas_coverage_env.vehicle.record import COUNTS, VEHICLE_DTYPE
 from uas_coverage_env.world.state import STATE
 
 
@@ -48,8 +48,9 @@ def checked(
     n_waypoints = np.array([len(scenario.waypoints) for scenario in scenarios])[flown]
     for lane, known in changed.items():
         n_waypoints[lane] = len(known.waypoints)
+    true_vehicles = np.ascontiguousarray(state["true_vehicles"]).view(VEHICLE_DTYPE)
     check_values(
-        state,
+        {**state, "true_vehicles": true_vehicles},
         {
             **LANES.limits({"S": len(scenarios)}, lanes=False),
             **STATE.limits({"samples": longest + 1}, lanes=True),

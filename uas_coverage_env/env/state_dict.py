@@ -18,6 +18,11 @@ def by_present_names(state: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any
     return {_FORMER.get(name, name): array for name, array in state.items()}
 
 
+def as_numbers(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, or of one of records its bytes, which every format of files holds; a view."""
+    return array if array.dtype.names is None else array.view(np.uint8)
+
+
 def check_like(state: Mapping[str, NDArray[Any]], own: Mapping[str, NDArray[Any]]) -> None:
     """Refuse arrays that are not as our own are.
 
