@@ -14,6 +14,7 @@ from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.cuda import CudaMissions
 from uas_coverage_env.features import constant_wind, disturbances_of
 from uas_coverage_env.scenario import Uncertainty, Wind, with_disturbances
+from uas_coverage_env.vehicle import VEHICLE_DTYPE
 
 GROUND = practice_ground(n_uas=2, max_steps=12)
 LEVEL = disturbances_of(with_disturbances(GROUND, "moderate", 1))
@@ -134,12 +135,14 @@ def test_a_batch_that_is_put_aside_goes_on_as_if_it_had_not_been():
     kept = batch.state_dict()
     assert kept["disturbance_random"].all()
     assert kept["disturbance_memory"].any()
+    # numbers that every format of files holds
+    assert all(array.dtype.names is None for array in kept.values())
     other = CoverageBatch(2, GROUND, disturbances=OWN)
     other.load_state_dict(kept)
     copied = pickle.loads(pickle.dumps(batch))
     for name, value in (("mass_kg", np.nan), ("n_segments", 9)):
         broken = {key: array.copy() for key, array in kept.items()}
-        broken["true_vehicles"][name][1, 0] = value
+        broken["true_vehicles"].view(VEHICLE_DTYPE)[name][1, 0] = value
         with pytest.raises(ValueError, match=rf"true_vehicles.{name}\[1, 0\] is"):
             other.load_state_dict(broken)
     for _ in range(6):
