@@ -430,5 +430,5 @@ def test_a_disturbance_that_no_example_had_is_refused_in_a_batch():
         wind = {"mean_mps": 3.0, "from_deg": 0.0}
         return type(town).model_validate({**town.model_dump(by_alias=True), "wind": wind})
 
-    with pytest.raises(ValueError, match="disturbance wind is new"):
+    with pytest.raises(ValueError, match="wind is new"):
         CoverageVectorEnv(2, surprising).reset(seed=0)

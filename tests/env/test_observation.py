@@ -139,7 +139,7 @@ def test_own_state_is_scaled_by_fence_and_limits():
             "rates": x[WX : WX + 3] / rates,
             "reference": state.reference_mps[i] / limits.v_xy_max_mps,
             "flying": 1.0,
-            "departed": state.uas[i].departed,
+            "departed": state.departed[i],
             "returning": 0.0,
             "rank": float(i),
             "dod": x[DOD],

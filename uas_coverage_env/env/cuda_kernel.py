@@ -11,7 +11,7 @@ import numpy as np
 from numba import cuda
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.views import copy_arrays, lane_view
 from uas_coverage_env.entities.state import STATE, as_observed
 from uas_coverage_env.env.act import (
@@ -90,39 +90,51 @@ def _is_due(state):
     return due
 
 
-@inlined_kernel
-def _flies(pool, missions, begin, lane):
-    """Whether a lane flies in this step: it refuses an action, or begins a mission, where not."""
-    learners = learners_of(missions.learners, lane, pool.arenas, missions.scene[lane, 0])
-    missions.due[lane] = False
-    missions.refused[lane] = first_not_finite(learners.asked) != ACCEPTED
-    if missions.refused[lane]:
-        return False
-    if missions.ended[lane]:
-        _begin(pool, missions, begin, lane)
-        return False
-    return True
+@cache
+def _begin_with(features: tuple[Feature, ...]) -> Any:
+    """A function that begins the next mission of a lane."""
+    begin_features = called_at_begin(features)
+
+    @kernel
+    def begin(pool, missions, lane):
+        missions.ended[lane] = False
+        missions.mission[lane] += 1
+        missions.scene[lane, 0] = 0
+        for k in range(missions.changes.shape[1]):
+            missions.changes[lane, k] = -1
+        arena, state = arena_of(pool.arenas, 0), state_of(missions.worlds, lane, pool.arenas, 0)
+        copy_arrays(start_of(pool.starts, 0), state)
+        seed, mission = missions.seed[lane], missions.mission[lane]
+        begin_events(arena, state, seed, mission)
+        begin_features(arena, state, seed, mission)
+        learners = learners_of(missions.learners, lane, pool.arenas, 0)
+        copy_arrays(first_learners_at(pool.learners, 0), learners)
+        seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
+        copy_arrays(first_observation_at(pool.first_observations, 0), seen)
+        for i in range(state.uas.shape[0]):
+            missions.rewards[lane, i] = 0.0
+
+    return begin
 
 
-@inlined_kernel
-def _begin(pool, missions, begin, lane):
-    """Begin the next mission of a lane."""
-    missions.ended[lane] = False
-    missions.mission[lane] += 1
-    missions.scene[lane, 0] = 0
-    for k in range(missions.changes.shape[1]):
-        missions.changes[lane, k] = -1
-    arena, state = arena_of(pool.arenas, 0), state_of(missions.worlds, lane, pool.arenas, 0)
-    copy_arrays(start_of(pool.starts, 0), state)
-    seed, mission = missions.seed[lane], missions.mission[lane]
-    begin_events(arena, state, seed, mission)
-    begin(arena, state, seed, mission)
-    learners = learners_of(missions.learners, lane, pool.arenas, 0)
-    copy_arrays(first_learners_at(pool.learners, 0), learners)
-    seen = _look_of(missions.first_observations, lane, pool.arenas, 0)
-    copy_arrays(first_observation_at(pool.first_observations, 0), seen)
-    for i in range(state.uas.shape[0]):
-        missions.rewards[lane, i] = 0.0
+@cache
+def _flies_with(features: tuple[Feature, ...]) -> Any:
+    begin = _begin_with(features)
+
+    @kernel
+    def flies(pool, missions, lane):
+        """Whether a lane flies: it refuses an action, or begins a mission, where not."""
+        learners = learners_of(missions.learners, lane, pool.arenas, missions.scene[lane, 0])
+        missions.due[lane] = False
+        missions.refused[lane] = first_not_finite(learners.asked) != ACCEPTED
+        if missions.refused[lane]:
+            return False
+        if missions.ended[lane]:
+            begin(pool, missions, lane)
+            return False
+        return True
+
+    return flies
 
 
 @kernel
@@ -225,7 +237,7 @@ def _fly_with(features: tuple[Feature, ...], nonlinear: bool, has_true_vehicles:
 
 
 @cache
-def _step_of(write: Any, begin: Any, fly: Any) -> Any:
+def _step_of(write: Any, flies: Any, fly: Any) -> Any:
     """The step of all lanes, made of these functions."""
 
     @cuda.jit
@@ -233,7 +245,7 @@ def _step_of(write: Any, begin: Any, fly: Any) -> Any:
         lane = cuda.grid(1)  # pyrefly: ignore[missing-argument]
         if lane < missions.ended.shape[0]:
             write(pool, acting, missions, lane)
-            if _flies(pool, missions, begin, lane):
+            if flies(pool, missions, lane):
                 _decide(pool, acting, missions, lane)
                 fly(pool, missions, lane)
                 _finish(pool, paying, observing, missions, lane)
@@ -254,7 +266,7 @@ def step_with(
     """
     return _step_of(
         _write_as_usual if write is None else _write_with(write),
-        called_at_begin(features),
+        _flies_with(features),
         _fly_with(features, nonlinear, has_true_vehicles),
     )
 
@@ -283,7 +295,7 @@ def new_missions(pool: ScenarioPool, num_envs: int, seed: int) -> Missions:
         np.zeros((num_envs, sizes["changes"]), dtype=np.int64),
         np.zeros(num_envs, dtype=np.bool_),
     )
-    _begin_all(called_at_begin(pool.features))(pool.arrays, missions)
+    _begin_all(_begin_with(pool.features))(pool.arrays, missions)
     return missions
 
 
@@ -292,6 +304,6 @@ def _begin_all(begin: Any) -> Any:
     @kernel
     def begin_all(pool, missions):
         for lane in range(missions.ended.shape[0]):
-            _begin(pool, missions, begin, lane)
+            begin(pool, missions, lane)
 
     return begin_all

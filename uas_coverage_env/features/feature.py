@@ -104,6 +104,7 @@ _parameters_of = record_view(np.dtype(np.float64))
 _memory_of = record_view(MEMORY_DTYPE)
 
 
+@dataclass(frozen=True)
 class Disturbance(Feature):
     """A feature that acts on each UAS by itself, and that no planner is told of.
 
@@ -117,7 +118,7 @@ class Disturbance(Feature):
     float64; `memory` is (DISTURBANCE_MEMORY,) float64 of UAS i, zero at t = 0 and kept from step to
     step; `random` is what `uniform` and `normal` of `uas_coverage_env.features` draw from.
 
-    Args:
+    Attributes:
         name: Its name, which also tells its random numbers from those of others.
         act: The kernel.
         parameters: Finite numbers that it is handed.
@@ -128,38 +129,23 @@ class Disturbance(Feature):
         ValueError: A parameter is not finite, or the name is empty.
     """
 
+    kernels: Mapping[Point, Any] = field(init=False, compare=False, repr=False)
+    records: NDArray[Any] = field(init=False, compare=False, repr=False)
+    memory: np.dtype | None = field(init=False, compare=False, repr=False)
+    key: int | None = field(init=False, compare=False, repr=False, default=None)
+    perturbs: bool = field(default=False, kw_only=True)
     act: Any
-    parameters: tuple[float, ...]
-    common: bool
+    parameters: tuple[float, ...] = ()
+    common: bool = False
 
-    def __init__(
-        self,
-        name: str,
-        act: Any,
-        parameters: tuple[float, ...] = (),
-        common: bool = False,
-        perturbs: bool = False,
-    ) -> None:
-        check_parameters(f"disturbance {name}", parameters)
-        super().__init__(
-            name,
-            {Point.BEGIN: _begin_common if common else _begin_each, Point.ACT: _on_each(act)},
-            np.array(parameters, dtype=np.float64),
-            MEMORY_DTYPE,
-            perturbs=perturbs,
-        )
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parameters(f"disturbance {self.name}", self.parameters)
+        begin = _begin_common if self.common else _begin_each
+        kernels = {Point.BEGIN: begin, Point.ACT: _on_each(self.act)}
+        records = np.array(self.parameters, dtype=np.float64)
         # frozen, as all features are
-        self.__dict__.update(act=act, parameters=tuple(parameters), common=common)
-
-    @property
-    def _said(self) -> tuple[Any, ...]:
-        return self.name, self.act, self.parameters, self.common, self.perturbs
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Disturbance) and self._said == other._said
-
-    def __hash__(self) -> int:
-        return hash(self._said)
+        self.__dict__.update(kernels=kernels, records=records, memory=MEMORY_DTYPE)
 
 
 @cache
