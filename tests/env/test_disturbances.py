@@ -143,6 +143,10 @@ def test_a_batch_that_is_put_aside_goes_on_as_if_it_had_not_been():
         broken[f"true_vehicles.{name}"][1, 0] = value
         with pytest.raises(ValueError, match=rf"true_vehicles.{name}\[1, 0\] is"):
             other.load_state_dict(broken)
+    broken = {**kept, "memory": kept["memory"].copy()}
+    broken["memory"][1].view(np.float64)[0] = np.nan
+    with pytest.raises(ValueError, match=r"memory\[1\]\.\w+\.numbers\[0, 0\] is nan"):
+        other.load_state_dict(broken)
     for _ in range(6):
         observation = batch.step(actions)
         np.testing.assert_array_equal(other.step(actions), observation)

@@ -13,6 +13,7 @@ from uas_coverage_env.env.memory import LEARNERS
 from uas_coverage_env.env.pool import ScenarioPool
 from uas_coverage_env.env.scenes import scenes_in
 from uas_coverage_env.env.state_dict import check_values
+from uas_coverage_env.features.feature import fitted_to, memory_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle.record import COUNTS
 
@@ -57,6 +58,11 @@ def checked(
             **{f"true_vehicles.{name}": most for name, most in COUNTS.items()},
         },
     )
+    for lane in np.flatnonzero(begun & (state["memory"].shape[1] > 0)).tolist():
+        flies = scenarios[flown[lane]]
+        slots = fitted_to(pool.features, pool.settings.features_in(flies))
+        kept = memory_of(slots, len(flies.uas), state["memory"][lane])
+        check_values({f"memory[{lane}].{name}": records for name, records in kept.items()}, {})
     if isinstance(pool, DrawnPool):
         check_values(state, {"scenario": pool.slots_of(begun)})
     return drawn, changed

@@ -272,5 +272,24 @@ def memory_words(features: Sequence[Feature | None], n_uas: int) -> int:
     return sum(_words(n_uas * dtype.itemsize) for dtype in kept if dtype is not None)
 
 
+def memory_of(
+    features: Sequence[Feature | None], n_uas: int, words: NDArray[np.uint64]
+) -> dict[str, NDArray[np.void]]:
+    """What features have kept in the memory of a mission, by their names: views of it.
+
+    Args:
+        features: In the order of `Arena.features`.
+        n_uas: Size of the fleet.
+        words: `WorldState.memory`.
+    """
+    kept, first = {}, 0
+    for feature in features:
+        if feature is not None and feature.memory is not None:
+            n_bytes = n_uas * feature.memory.itemsize
+            kept[feature.name] = words[first:].view(np.uint8)[:n_bytes].view(feature.memory)
+            first += memory_words([feature], n_uas)
+    return kept
+
+
 def _words(n_bytes: int) -> int:
     return -(-n_bytes // _WORD)
