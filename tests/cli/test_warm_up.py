@@ -12,7 +12,8 @@ from uas_coverage_env.cli import run as cli_run
 from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.compiled import progress
 from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.compiled.progress import COMPILATIONS, compiling_for
+from uas_coverage_env.compiled.progress import COMPILATIONS
+from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.flight import load_planner, planner_names
 
 

@@ -9,14 +9,13 @@ import pytest
 from uas_coverage_env.compiled import progress
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.progress import (
-    COMPILATIONS,
     NOTICE,
     Compilations,
-    compiling_for,
     listening,
 )
+from uas_coverage_env.compiled.purpose import compiling_for
 
-LINE = f"uas_coverage_env: {NOTICE}\n".format(purpose=COMPILATIONS.purpose)
+LINE = f"uas_coverage_env: {NOTICE}\n".format(purpose="this program")
 
 
 @kernel

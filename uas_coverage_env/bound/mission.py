@@ -20,7 +20,7 @@ from uas_coverage_env.bound.passing import Costs, Passing
 from uas_coverage_env.bound.prices import STEPS, Ends, cheapest, energy_prices
 from uas_coverage_env.bound.program import Cut, least_routes
 from uas_coverage_env.bound.turning import Turning, motion_of, turning_of_fleet
-from uas_coverage_env.compiled.progress import compiling_for
+from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]

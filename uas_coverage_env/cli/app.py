@@ -14,7 +14,7 @@ from uas_coverage_env.cli.lazy import MARKUP, CommandEntry, LazyGroup, at
 from uas_coverage_env.cli.output import DONE, FAILED, one_line
 from uas_coverage_env.cli.plugins import plugin_entries
 from uas_coverage_env.cli.termination import terminated_as_by_hand
-from uas_coverage_env.compiled.progress import compiling_for
+from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.files.errors import InputError, PlannerError
 from uas_coverage_env.plugins.users_code import described, place_of
 

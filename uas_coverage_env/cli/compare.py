@@ -15,7 +15,7 @@ from rich.progress import Progress as ProgressBar
 
 from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
-from uas_coverage_env.compiled.progress import compiling_for
+from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
     FLOWN,

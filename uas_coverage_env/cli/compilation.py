@@ -6,7 +6,8 @@ from contextlib import contextmanager, nullcontext
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from uas_coverage_env.compiled.progress import COMPILATIONS, compiling_for, listening
+from uas_coverage_env.compiled.progress import listening
+from uas_coverage_env.compiled.purpose import compiling_for, purpose
 from uas_coverage_env.flight import Planner, rollout
 from uas_coverage_env.flight.registry import name_of
 from uas_coverage_env.scenario import Scenario
@@ -33,7 +34,7 @@ def compilation_shown(screen: Console | None = None) -> Iterator[None]:
             return
         if not bar.live.is_started:
             bar.start()
-        bar.update(task, completed=share, description=f"compiling for {COMPILATIONS.purpose}")
+        bar.update(task, completed=share, description=f"compiling for {purpose()}")
 
     try:
         with listening(listener):

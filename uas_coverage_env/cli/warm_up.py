@@ -7,7 +7,8 @@ import typer
 
 from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.compiled.progress import COMPILATIONS, compiling_for
+from uas_coverage_env.compiled.progress import COMPILATIONS
+from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.draw import picture
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.env.vector import CoverageVectorEnv

@@ -14,6 +14,7 @@ from typing import Any
 from numba.core import event
 
 from uas_coverage_env.compiled.internals import KernelDispatcher, MachineCode
+from uas_coverage_env.compiled.purpose import purpose
 
 NOTICE = "compiling for {purpose}: up to a minute, and kept on disk for later runs ..."
 
@@ -34,11 +35,10 @@ def _say_it_once() -> Listener:
     said: set[str] = set()
 
     def listener(share: float | None) -> None:
-        purpose = COMPILATIONS.purpose
-        if purpose in said or _logger.level > logging.INFO:
+        if purpose() in said or _logger.level > logging.INFO:
             return
-        said.add(purpose)
-        notice = NOTICE.format(purpose=purpose)
+        said.add(purpose())
+        notice = NOTICE.format(purpose=purpose())
         if _logger.isEnabledFor(logging.INFO) and _logger.hasHandlers():
             _logger.info(notice)
         else:
@@ -54,13 +54,11 @@ class Compilations(event.Listener):
 
     Attributes:
         listener: Told once the process has spent more than PATIENCE_S.
-        purpose: What they are for, in words.
         n_compiled: Kernels compiled so far, each of its parts counted.
     """
 
     def __init__(self) -> None:
         self.listener = _say_it_once()
-        self.purpose = "this program"
         self.n_compiled = 0
         self.spent_s = self._since_s = 0.0
         self._depth = self._n_made = 0
@@ -100,13 +98,3 @@ def listening(listener: Listener) -> Iterator[None]:
         yield
     finally:
         COMPILATIONS.listener = before
-
-
-@contextmanager
-def compiling_for(purpose: str) -> Iterator[None]:
-    """Say what is compiled for, for a while."""
-    before, COMPILATIONS.purpose = COMPILATIONS.purpose, purpose
-    try:
-        yield
-    finally:
-        COMPILATIONS.purpose = before

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.progress import COMPILATIONS, compiling_for
+from uas_coverage_env.compiled.progress import COMPILATIONS
+from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.env.meter import RewardMeter
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.features import Feature
