@@ -3,10 +3,11 @@
 import time
 
 import pytest
+from numba.core import event
 from small_worlds import meadow
 
 from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.compiled.progress import COMPILATIONS
+from uas_coverage_env.autopilot.guidance import steer
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.world import GoTo
 
@@ -20,8 +21,7 @@ class Compiles:
         pass
 
     def act(self, swarm):
-        with COMPILATIONS.one(lambda: 1):
-            COMPILATIONS.begun()
+        with event.trigger_event("numba:compile", {"dispatcher": steer}):
             time.sleep(0.2)
         return {name: GoTo(0) for name in swarm.active}
 

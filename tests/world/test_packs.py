@@ -60,7 +60,7 @@ def test_it_flies_again_with_a_fresh_pack_when_its_swap_is_over():
     landed = first_sortie(world)
     seen = world.swarm_state()
     assert world.state.uas["status"].tolist() == [SWAPPING, FLYING]
-    assert seen.uas["status"].tolist() == [LANDED, FLYING]
+    assert seen.status.tolist() == [LANDED, FLYING]
     assert seen.active == ("uas_2",)
     assert seen.x[0, DOD] > 0.2
     place_m = seen.x[0, :3].copy()
@@ -186,7 +186,7 @@ def test_a_reset_gives_all_packs_back():
         world.reset()
         first_sortie(world)
         fly(world, has(0, FLYING), BACK)
-        assert world.state.packs[0, 0] == 1
+        assert world.state.packs[0].number == 1
 
 
 def test_no_file_says_together_that_did_not_before():
