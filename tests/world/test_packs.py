@@ -69,8 +69,8 @@ def test_it_flies_again_with_a_fresh_pack_when_its_swap_is_over():
     assert seen.active == ("uas_1", "uas_2")
     assert seen.x[0, DOD] == pytest.approx(0.2)
     assert (seen.x[0, :3] == place_m).all()
-    assert not seen.uas[0].departed
-    assert not seen.uas[0].returning
+    assert not seen.departed[0]
+    assert not seen.returning[0]
 
 
 def test_without_a_pack_left_landing_is_final():
