@@ -51,5 +51,5 @@ def test_guidance_is_there_before_the_first_decision_of_a_planner_that_says_it_n
     planner = Notes()
     planner.goes_to = goes_to
     rollout(meadow(), planner, max_steps=2)
-    before = ["guidance", "decides"] if goes_to else ["none", "decides", "guidance"]
-    assert order == [*before, "decides"]
+    before = ["guidance", "decides"] if goes_to else ["decides", "guidance"]
+    assert order == ["none", *before, "decides"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from uas_coverage_env.autopilot.belief import believed_wrench, expect, learn
 from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, rarely
 from uas_coverage_env.entities.commands import WRENCH
 from uas_coverage_env.entities.state import FLYING, as_estimated
 from uas_coverage_env.features.feature import Feature, Point
@@ -130,7 +130,7 @@ def _check_and_clip(arena, i, event):
     clip_wrench(arena.vehicles[i], event.u)
 
 
-@inlined_kernel
+@rare_kernel
 def _rest(arena, state, i, outcome):
     """A UAS on the ground with its motors off: nothing moves, nothing is drawn."""
     x = state.x[i]

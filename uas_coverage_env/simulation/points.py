@@ -7,7 +7,7 @@ from numba import typeof, types
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.calls import Signature
-from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import STATE
@@ -79,7 +79,7 @@ def call_features(point, arena, state, code, outcome):
         code: `FeatureCode`; None: no mission has any.
         outcome: (U,) of OUTCOME_DTYPE.
     """
-    if code is not None:
+    if code is not None and rarely(code[point] < code[point + 1]):
         for k in range(code[point], code[point + 1], 2):
             if arena.features[code[k]].acts:
                 _call(code[k + 1], arena, state, outcome, code[k])

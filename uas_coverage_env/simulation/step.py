@@ -30,7 +30,7 @@ from uas_coverage_env.world.contacts import (
 from uas_coverage_env.world.coverage import cover, land
 from uas_coverage_env.world.events import begin_events
 
-ACCEPTED = -1
+ACCEPTED, LACKS_GUIDANCE = -1, -2
 
 
 @kernel
@@ -156,21 +156,27 @@ _N_NUMBERS = MISSION.size
 
 
 @kernel
-def step_world(at, commands, nonlinear, assistants, outcome):
+def step_world(at, commands, nonlinear, goes_to, assistants, outcome):
     """`advance` called from Python.
 
     Args:
         at: Addresses of arena and state, see `MISSION`, then `FeatureCode`.
         commands: See `advance`, also the next three.
-        nonlinear: Whether.
+        nonlinear: Whether the 6-DOF plant is flown.
+        goes_to: Whether guidance is among the assistants.
         assistants: What helps to fly.
         outcome: Written.
 
     Returns:
-        ACCEPTED, or the index of a UAS whose command is invalid; then nothing has changed.
+        ACCEPTED; the index of a UAS whose command is invalid, or LACKS_GUIDANCE: then nothing has
+        changed.
     """
     arena, state = _views(at)
     invalid = first_invalid(arena, state, commands)
+    if not goes_to:
+        for i in range(commands.shape[0]):
+            if commands[i].kind == GO_TO and invalid == ACCEPTED:
+                invalid = LACKS_GUIDANCE
     if invalid == ACCEPTED:
         code = slice_view(at, _N_NUMBERS, at.shape[0] - _N_NUMBERS)
         advance(arena, state, commands, nonlinear, assistants, code, outcome)

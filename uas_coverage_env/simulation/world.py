@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
-from uas_coverage_env.entities.commands import COMMAND_DTYPE, GO_TO, KIND_NAMES, Command, pack
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import (
     FLYING,
@@ -32,6 +32,7 @@ from uas_coverage_env.simulation.scenes import (
 )
 from uas_coverage_env.simulation.step import (
     ACCEPTED,
+    LACKS_GUIDANCE,
     MISSION,
     begin_features_at,
     begin_mission,
@@ -50,6 +51,7 @@ from uas_coverage_env.world.packs import (
 from uas_coverage_env.world.sensing import senses
 
 Dynamics = Literal["lpv", "nonlinear"]
+StepCode = Callable[..., int]
 
 _OUTCOMES_IN_BLOCK = 256
 
@@ -179,7 +181,7 @@ class World:
         self._state = self._start.copy()
         self._changes = changes_scene(scenario)
         self._nonlinear = dynamics == "nonlinear"
-        self._goes_to = goes_home(scenario)
+        self._goes_to = self.return_mode or goes_home(scenario)
         self._prepare()
         self._seed = 0
         self.reset(seed)
@@ -187,7 +189,7 @@ class World:
     def _prepare(self) -> None:
         self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
         self._next_outcome = 0
-        self._step: Callable[..., int] | None = None
+        self._step: StepCode | None = None
         self._assistants: AssistantCode = np.zeros(0, dtype=np.int64)
         self._at = np.zeros(0, dtype=np.int64)
 
@@ -260,23 +262,28 @@ class World:
             )
         elif not commands.flags.c_contiguous:
             commands = commands.copy()
-        if not self._goes_to and GO_TO in commands["kind"].tolist():
-            self._goes_to, self._step = True, None
-        if self._step is None:
-            # not before: environments have a world, too, and a step of their own; and guidance is
-            # as much to compile as all the rest, for commands that may never come
-            self._assistants = assistants(
-                self.return_mode, self.safety_filter, goes_to=self._goes_to
-            )
         outcome = self._fresh_outcome()
-        arguments = (self._addresses(), commands, self._nonlinear, self._assistants, outcome)
-        if self._step is None:
-            self._step = machine_code(step_world, arguments)
-        invalid = self._step(*arguments)
+        # not before: environments have a world, too, and a step of their own
+        step = self._step or self._make_ready(commands, outcome)
+        invalid = step(
+            self._at, commands, self._nonlinear, self._goes_to, self._assistants, outcome
+        )
+        if invalid == LACKS_GUIDANCE:
+            # as much to compile as all the rest, for commands that may never come
+            self._goes_to, self._step = True, None
+            return self.step(commands)
         if invalid != ACCEPTED:
             raise ValueError(self._what_is_wrong(invalid, commands[invalid]))
         self.change_scene()
         return outcome
+
+    def _make_ready(self, commands: NDArray[np.void], outcome: NDArray[np.void]) -> StepCode:
+        self._assistants = assistants(self.return_mode, self.safety_filter, goes_to=self._goes_to)
+        arguments = (
+            self._addresses(), commands, self._nonlinear, self._goes_to, self._assistants, outcome
+        )  # fmt: skip
+        self._step = machine_code(step_world, arguments)
+        return self._step
 
     def _arena_of(self, scenario: Scenario) -> Arena:
         return build_arena(
