@@ -2,11 +2,11 @@
 
 from collections.abc import Iterable, Mapping
 from functools import cached_property
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, SerializerFunctionWrapHandler, Strict, model_serializer
+from pydantic import Field, SerializerFunctionWrapHandler, Strict, create_model, model_serializer
 
 from uas_coverage_env.features.event import EventTable
 from uas_coverage_env.features.parameter_errors import Uncertainty
@@ -43,7 +43,18 @@ _ALWAYS = ("obstacles", "moving_obstacles", "decorations")
 """In files where they are empty, too."""
 
 
-class UncheckedScenario(StrictModel):
+_NAMED = ("wind", "uncertainty", "sensing")
+"""The tables of features that something here reads by name."""
+
+if TYPE_CHECKING:
+    _Tables = StrictModel
+else:
+    _tables = [each for each in shipped(FeatureTable) if each.table not in _NAMED]
+    _fields = {each.table: (each | None, None) for each in _tables}
+    _Tables = create_model("_Tables", __base__=StrictModel, **_fields)
+
+
+class UncheckedScenario(_Tables):
     """The fields of a `Scenario`, each allowed by itself; what checks and estimates read."""
 
     schema_version: int = Field(alias="schema", ge=1, le=1)
@@ -70,12 +81,6 @@ class UncheckedScenario(StrictModel):
     events: Events = ()
     sorties: Sorties | None = None
     execution: Execution | None = None
-    # the tables of features that nothing here asks for
-    for _table in shipped(FeatureTable):
-        if _table.table not in __annotations__:
-            __annotations__[_table.table] = _table | None
-            locals()[_table.table] = None
-    del _table
 
     @model_serializer(mode="wrap")
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
