@@ -8,7 +8,7 @@ from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.simulation import advance, initial_state
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, VELOCITY, build_arena
 
-# written, and read, only where disturbances act: `disturb` resets them
+# written, and read, only where disturbances act: `flight.clear` resets them
 OF_DISTURBANCES = {"wind_mps", "force_N", "dod_lost"}
 
 SCENARIO = generate_scenario(3, n_uas=3, n_waypoints=20, n_obstacles=10)

@@ -1,6 +1,6 @@
 """Arrays for kernels that lie in the memory of others: views, which own nothing.
 
-Whoever makes one keeps the memory for as long; it must not leave compiled code. The functions made
+The caller keeps the memory alive; a view must not leave compiled code. The functions made
 here are for kernels, with NUMBA_DISABLE_JIT=1 and on a GPU too; they have to be bound to a name of
 a module, since numba takes no attributes of objects.
 """

@@ -53,7 +53,7 @@ EVENT_STATE_DTYPE = record_dtype(
     [
         # the sample at which it happens
         ("step", "i8"),
-        # whom it happens to: the index of a UAS, or EVERY
+        # which UAS it happens to: an index, or EVERY
         ("uas", "i8"),
         # the state of the generator that it draws from
         ("random", "u8", (1,)),

@@ -1,6 +1,6 @@
 """Commands that do not arrive: a radio or a planner is lost."""
 
-from typing import ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
 from uas_coverage_env.compiled.memory import record_dtype
@@ -72,25 +72,13 @@ _DEAF = Feature(
 )
 
 
-class RadioLost(OfUas):
-    """No command reaches a UAS for a while. On-board functions (return mode, filter) go on.
-
-    Attributes:
-        kind: `"radio_lost"`.
-        for_s: How long [s].
-        then: What it flies meanwhile: `"go_on"` (its last command), `"hover"` or `"return"`.
-    """
+class _Deafens:
+    """What both events do to kernels."""
 
     feature: ClassVar = _DEAF
 
-    kind: Literal["radio_lost"]
-    for_s: Seconds
-    then: Then = "hover"
-
-    @property
-    def lasts_s(self) -> float:
-        """For as long as it says [s]."""
-        return self.for_s
+    if TYPE_CHECKING:
+        then: Any
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -103,7 +91,26 @@ class RadioLost(OfUas):
         return self.then == "return"
 
 
-class PlannerLost(EventTable):
+class RadioLost(_Deafens, OfUas):
+    """No command reaches a UAS for a while. On-board functions (return mode, filter) go on.
+
+    Attributes:
+        kind: `"radio_lost"`.
+        for_s: How long [s].
+        then: What it flies meanwhile: `"go_on"` (its last command), `"hover"` or `"return"`.
+    """
+
+    kind: Literal["radio_lost"]
+    for_s: Seconds
+    then: Then = "hover"
+
+    @property
+    def lasts_s(self) -> float:
+        """For as long as it says [s]."""
+        return self.for_s
+
+
+class PlannerLost(_Deafens, EventTable):
     """The planner fails: no command reaches any UAS any more.
 
     Attributes:
@@ -112,18 +119,7 @@ class PlannerLost(EventTable):
             `"return"`.
     """
 
-    feature: ClassVar = _DEAF
     on_all: ClassVar[bool] = True
 
     kind: Literal["planner_lost"]
     then: Then = "return"
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """What they fly."""
-        return (float(get_args(Then).index(self.then)),)
-
-    @property
-    def goes_home(self) -> bool:
-        """Whether they are sent home."""
-        return self.then == "return"
