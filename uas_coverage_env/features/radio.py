@@ -1,6 +1,6 @@
 """Commands that do not arrive: a radio or a planner is lost."""
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
 from uas_coverage_env.compiled.memory import record_dtype
@@ -77,18 +77,16 @@ class _Deafens:
 
     feature: ClassVar = _DEAF
 
-    if TYPE_CHECKING:
-        then: Any
-
     @property
     def values(self) -> tuple[float, ...]:
-        """What it flies."""
-        return (float(get_args(Then).index(self.then)),)
+        """What is flown meanwhile: the place of the key `then`."""
+        table: Any = self
+        return (float(get_args(Then).index(table.then)),)
 
     @property
     def goes_home(self) -> bool:
-        """Whether it is sent home."""
-        return self.then == "return"
+        """Whether UAS are sent home."""
+        return self.values[0] == _RETURN
 
 
 class RadioLost(_Deafens, OfUas):
