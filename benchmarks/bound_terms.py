@@ -34,7 +34,7 @@ from uas_coverage_env.bound.prices import WITHIN, Prices
 from uas_coverage_env.bound.turning import Motion, Turning, motion_of
 from uas_coverage_env.flight import energy_Wh
 from uas_coverage_env.scenario import sample_scenario
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY
 
 FloatArray = NDArray[np.float64]
 

@@ -55,7 +55,9 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.simulation import Dynamics
-from uas_coverage_env.vehicle import DOD, dod_per_s, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import CONSUMPTION, LANDED
 
 RETURNS_OF_A_TOWN = 5

@@ -33,7 +33,8 @@ from uas_coverage_env.env.reward_kernel import compute_rewards, paying_of
 from uas_coverage_env.env.rewards import REWARD
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.simulation.pool import arena_of, state_of
-from uas_coverage_env.vehicle import N_STATES, lpv_step
+from uas_coverage_env.vehicle import lpv_step
+from uas_coverage_env.vehicle.layout import N_STATES
 from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.contacts import (

@@ -11,8 +11,7 @@ from uas_coverage_baselines.targets import Targets, warm_up_once
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import Handover, MissionBrief
 from uas_coverage_env.planning.reserves import LAWNMOWER
-from uas_coverage_env.vehicle import dod_per_s
-from uas_coverage_env.vehicle.range import level_seconds, speeds_of
+from uas_coverage_env.vehicle.range import dod_per_s, level_seconds, speeds_of
 from uas_coverage_env.world import Command, SwarmState
 
 # Share of the charge that a run may be planned to use.

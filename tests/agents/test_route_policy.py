@@ -28,7 +28,8 @@ from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.flight import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.raised import raised
-from uas_coverage_env.vehicle import THETA, VX, VY, X, fly_kinematics
+from uas_coverage_env.vehicle.layout import THETA, VX, VY, X
+from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.world import COMMAND_DTYPE, build_arena
 
 

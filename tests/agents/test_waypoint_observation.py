@@ -21,7 +21,7 @@ from waypoint_missions import town
 from waypoint_oracle import Mission, observation
 
 from uas_coverage_env.simulation import initial_state
-from uas_coverage_env.vehicle import DOD, VX, VZ
+from uas_coverage_env.vehicle.layout import DOD, VX, VZ
 from uas_coverage_env.world import HOME, LANDED, build_arena
 
 SCENARIOS = [

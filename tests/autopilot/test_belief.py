@@ -14,7 +14,7 @@ from uas_coverage_env.features import constant_wind
 from uas_coverage_env.flight.record import LANDED as FLIGHT_LANDED
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX, VY, VZ
+from uas_coverage_env.vehicle.layout import DOD, VX, VY, VZ
 from uas_coverage_env.world import (
     CONSUMPTION,
     LANDED,

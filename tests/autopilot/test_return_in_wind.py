@@ -10,7 +10,7 @@ from uas_coverage_env.features.wind import Gust, Wind
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.scenario import sample_scenario, with_disturbances
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, X, Y
+from uas_coverage_env.vehicle.layout import DOD, X, Y
 from uas_coverage_env.world import LANDED, LOST, GoTo, Velocity
 
 FAR = (waypoint((190.0, 100.0, -20.0), 5.0),)

@@ -8,7 +8,7 @@ from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env.autopilot.right_of_way import decision_order
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import X, Y, Z
+from uas_coverage_env.vehicle.layout import X, Y, Z
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, KIND_NAMES, LANDED
 
 VELOCITY = KIND_NAMES.index("velocity")

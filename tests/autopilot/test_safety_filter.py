@@ -4,7 +4,7 @@ from small_worlds import box, meadow, mover
 
 from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VX, VY, X, Y
+from uas_coverage_env.vehicle.layout import VX, VY, X, Y
 from uas_coverage_env.world import (
     COMMAND_DTYPE,
     CONTACT_NAMES,

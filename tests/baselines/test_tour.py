@@ -11,7 +11,7 @@ from uas_coverage_env.flight import Assistants, accomplished, coverage, home
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, Wind, generate_scenario, sample_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import LOST, GoTo, Velocity, build_arena
 
 QUICK = {"moves": 20_000, "changes": 60}

@@ -18,7 +18,8 @@ from uas_coverage_env.scenario import (
     sample_scenario,
     with_disturbances,
 )
-from uas_coverage_env.vehicle import CAPACITY, DOD, RESISTANCE, VZ, Z
+from uas_coverage_env.vehicle.layout import DOD, VZ, Z
+from uas_coverage_env.vehicle.true_vehicle import CAPACITY, RESISTANCE
 from uas_coverage_env.world import Velocity, Wrench
 
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])

@@ -20,7 +20,7 @@ from uas_coverage_env.mission import Relaunch, first_sight
 from uas_coverage_env.mission.handover import SILENT_S
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.uas_coverage_v0 import parallel_env
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo
 
 AHEAD = (waypoint((80.0, 30.0, -20.0), 8.0), waypoint((100.0, 30.0, -20.0), 8.0))

@@ -12,7 +12,7 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, Why, rollout, summary
 from uas_coverage_env.flight.left_open import left_open
 from uas_coverage_env.flight.record import LOST
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import GoTo
 
 

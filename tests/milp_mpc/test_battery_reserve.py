@@ -24,13 +24,9 @@ from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import inner_factor
 from uas_coverage_env.planning.reserves import BRAKING_S
-from uas_coverage_env.vehicle import (
-    DOD,
-    compile_vehicle,
-    dod_per_s,
-    load_vehicle,
-    seconds_to_land,
-)
+from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
+from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.vehicle.range import dod_per_s, seconds_to_land
 
 OPTIMAL = SolverLimits(relative_gap=1e-6, absolute_gap=1e-5)
 SKY = box((-2000.0, -2000.0, -100.0), (2000.0, 2000.0, 0.0))

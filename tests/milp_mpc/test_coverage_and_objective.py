@@ -11,7 +11,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import cylinder_faces, inner_factor, sphere_faces
-from uas_coverage_env.vehicle import DELTA_THRUST, DOD, LIFT, PSI, WX, WZ, linear_model
+from uas_coverage_env.vehicle import linear_model
+from uas_coverage_env.vehicle.layout import DELTA_THRUST, DOD, LIFT, PSI, WX, WZ
 
 MIDDLE = np.array([100.0, 100.0, -25.0])
 FAR = state((5.0, 5.0, -5.0))

@@ -21,7 +21,7 @@ from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import sphere_faces
-from uas_coverage_env.vehicle import PHI, THETA, VX, WY
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, WY
 
 BY_NODES = Effort(deterministic=True, teams=4)
 BY_TEAM = dataclasses.replace(BY_NODES, joint=None)

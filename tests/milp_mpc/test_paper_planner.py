@@ -20,7 +20,8 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, accomplished, load_planner, rollout
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VX, VY, return_threshold
+from uas_coverage_env.vehicle.layout import VX, VY
+from uas_coverage_env.vehicle.params import return_threshold
 from uas_coverage_env.world import Velocity, Wrench
 
 FLOWN = read_problems(Path(__file__).parents[2] / "benchmarks" / "village_decisions.json")

@@ -9,7 +9,7 @@ from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 from uas_coverage_env.flight import accomplished, load_planner, rollout
 from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VZ
+from uas_coverage_env.vehicle.layout import VZ
 from uas_coverage_env.world import LANDED
 
 

@@ -12,7 +12,8 @@ from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry import closed_cylinder_faces, sphere_faces
-from uas_coverage_env.vehicle import VX, VY, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import VX, VY
 
 HEXACOPTER = load_vehicle("hexacopter")
 OPEN_SKY = box((-1000.0, -1000.0, -1000.0), (1000.0, 1000.0, 1000.0))

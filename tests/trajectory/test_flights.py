@@ -15,7 +15,7 @@ from uas_coverage_baselines.trajectory.work import done
 
 from uas_coverage_env.geometry import segment_clearance
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 
 @pytest.fixture(scope="module")

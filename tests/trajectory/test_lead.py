@@ -28,7 +28,7 @@ from uas_coverage_env.mission import (
     in_disturbances,
 )
 from uas_coverage_env.scenario import Wind
-from uas_coverage_env.vehicle import N_INPUTS, VX, VY, VZ
+from uas_coverage_env.vehicle.layout import N_INPUTS, VX, VY, VZ
 from uas_coverage_env.world import COMMAND_DTYPE
 
 WIND_MPS = np.array([3.0, -4.0])

@@ -12,8 +12,10 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, Uncertainty
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.toml_text import toml_text
-from uas_coverage_env.vehicle import DOD, N_STATES, U_TH, RcPair, endurance
+from uas_coverage_env.vehicle import endurance
 from uas_coverage_env.vehicle.battery import BatteryState, further_settled_V
+from uas_coverage_env.vehicle.layout import DOD, N_STATES, U_TH
+from uas_coverage_env.vehicle.parts import RcPair
 from uas_coverage_env.world import Velocity
 
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])

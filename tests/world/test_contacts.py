@@ -3,7 +3,7 @@ import pytest
 from small_worlds import box, meadow, mover, waypoint
 
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX, VY, X
+from uas_coverage_env.vehicle.layout import DOD, VX, VY, X
 from uas_coverage_env.world import CONTACT_NAMES, FLYING, LOST, GoTo, Velocity
 
 

@@ -4,7 +4,7 @@ from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, U_TH, VX, VZ
+from uas_coverage_env.vehicle.layout import DOD, U_TH, VX, VZ
 from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity
 
 

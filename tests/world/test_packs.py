@@ -8,7 +8,7 @@ from uas_coverage_env import World
 from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.packs import Sorties
-from uas_coverage_env.vehicle import DOD, X, Y, Z
+from uas_coverage_env.vehicle.layout import DOD, X, Y, Z
 from uas_coverage_env.world import FLYING, LANDED, LOST, SWAPPING, GoTo, Velocity
 
 STARTS_M = ((20.0, 20.0, -10.0), (20.0, 100.0, -10.0))

@@ -16,7 +16,7 @@ from uas_coverage_env.draw import NoDisplayError
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight import Planner, Progress
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import LANDED, LOST
 
 _SECONDS_BETWEEN_LINES = 5.0

@@ -11,7 +11,7 @@ from uas_coverage_env.flight.record import LANDED, LOST, FlightRecord, LeftOpen,
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.mission import Access, Errand, Errands, MissionBrief
 from uas_coverage_env.scenario import out_of_reach
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 FloatArray = NDArray[np.float64]
 

@@ -29,8 +29,9 @@ from uas_coverage_env.flight.record import (
 )
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import LIMIT_NAMES, N_LIMITS, open_circuit_V, write_limited
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.discharge import open_circuit_V
+from uas_coverage_env.vehicle.limits import LIMIT_NAMES, N_LIMITS, write_limited
 from uas_coverage_env.world import CONTACT_NAMES, FLYING, SWAPPING, Command, command_mode
 from uas_coverage_env.world import LOST as IS_LOST
 

@@ -31,7 +31,7 @@ from uas_coverage_env.plugins.installed import version_of
 from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
-from uas_coverage_env.vehicle import Z
+from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Velocity, pack
 from uas_coverage_env.world.packs import swaps_alone
 

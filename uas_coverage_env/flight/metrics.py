@@ -19,7 +19,7 @@ from uas_coverage_env.flight.record import (
 from uas_coverage_env.flight.scene_history import covered_since
 from uas_coverage_env.flight.seen import seen_shares
 from uas_coverage_env.scenario.ground_phases import landing, take_off
-from uas_coverage_env.vehicle import DOD, U_TH
+from uas_coverage_env.vehicle.layout import DOD, U_TH
 from uas_coverage_env.vehicle.vertical_flight import VerticalFlight
 
 _J_PER_WH = 3600.0

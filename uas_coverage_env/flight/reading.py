@@ -45,7 +45,7 @@ from uas_coverage_env.flight.record import (
 )
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
 
 Count = Annotated[int, Field(ge=0)]
 Seconds = Annotated[float, Field(ge=0.0)]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import flight_home as seconds_home
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import build_arena
 

@@ -11,7 +11,7 @@ from uas_coverage_env.mission.handover import Handover
 from uas_coverage_env.mission.range import Range
 from uas_coverage_env.mission.views import WorldView
 from uas_coverage_env.mission.ways import Ways
-from uas_coverage_env.vehicle import DOD, VX
+from uas_coverage_env.vehicle.layout import DOD, VX
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import FLYING, LANDED, LOST, SwarmState
 from uas_coverage_env.world.packs import is_clear

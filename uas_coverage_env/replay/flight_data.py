@@ -14,7 +14,7 @@ from uas_coverage_env.replay.reach_data import reach
 from uas_coverage_env.replay.safety_data import floors_m, rooms
 from uas_coverage_env.replay.scene_data import hex_colour, scene_data
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 POSITION_M = 0.01
 PLAN_M = 0.1

@@ -38,8 +38,8 @@ from uas_coverage_env.simulation.step import (
     begin_mission,
     step_world,
 )
-from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
 from uas_coverage_env.vehicle.battery import BatteryState
+from uas_coverage_env.vehicle.layout import DOD, PSI, U_TH, WZ
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.packs import (

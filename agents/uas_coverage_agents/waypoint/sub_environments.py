@@ -30,7 +30,7 @@ from uas_coverage_env.simulation.pool import (
     start_of,
     state_of,
 )
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, WorldState, build_arena
 from uas_coverage_env.world.arena import ARENA
 

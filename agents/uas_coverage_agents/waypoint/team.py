@@ -22,7 +22,7 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.mission import find_blocked
 from uas_coverage_env.simulation import advance
-from uas_coverage_env.vehicle import Z
+from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING, GO_TO, HOME, OUTCOME_DTYPE, VELOCITY
 from uas_coverage_env.world.arena import ARENA
 

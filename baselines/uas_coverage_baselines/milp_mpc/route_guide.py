@@ -20,7 +20,7 @@ from uas_coverage_baselines.routing import (
 )
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.planning.reserves import ORDER_GUIDE, ORDER_GUIDE_RESERVE
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]

@@ -12,7 +12,7 @@ from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_env.flight import MODES, Flight, covered_at
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import VX, VY
+from uas_coverage_env.vehicle.layout import VX, VY
 from uas_coverage_env.world import FLYING, LANDED, LOST, SwarmState
 
 _NO_REACH_M = -1e4  # a distance that is kept wherever two UAS are

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_env.mission import Legs
-from uas_coverage_env.vehicle import VX, VY
+from uas_coverage_env.vehicle.layout import VX, VY
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -19,7 +19,7 @@ from uas_coverage_baselines.routing import (
 )
 from uas_coverage_env.mission import MEAN_HEIGHT_M, Legs, MissionBrief
 from uas_coverage_env.planning.reserves import TOUR, TOUR_RESERVE, TOUR_SCARCE_RESERVE
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import Arena, SwarmState
 
 FloatArray = NDArray[np.float64]

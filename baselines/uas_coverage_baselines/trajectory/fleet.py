@@ -32,7 +32,7 @@ from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.mission import Access, MissionBrief
 from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]

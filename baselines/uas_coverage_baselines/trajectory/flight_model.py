@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.belief import GUSTS, VERTICAL_GUSTS
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle import lpv_step, velocity_climb_wrench, write_limited
-from uas_coverage_env.vehicle.limits import N_LIMITS
+from uas_coverage_env.vehicle import lpv_step
+from uas_coverage_env.vehicle.inner_loop import velocity_climb_wrench
+from uas_coverage_env.vehicle.limits import N_LIMITS, write_limited
 
 FloatArray = NDArray[np.float64]
 

@@ -31,7 +31,7 @@ from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.mission import Range, WorldView
-from uas_coverage_env.vehicle import DELTA_THRUST
+from uas_coverage_env.vehicle.layout import DELTA_THRUST
 from uas_coverage_env.world import FLYING, GO_TO, HOME, WRENCH, SwarmState
 
 FloatArray = NDArray[np.float64]

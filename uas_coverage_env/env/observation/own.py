@@ -7,7 +7,7 @@ from uas_coverage_env.env.observation.relative import charge_left, within
 from uas_coverage_env.env.observation.remaining import share_of_open_weight
 from uas_coverage_env.env.observation.scales import MARGIN
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle import within_half_turn
+from uas_coverage_env.vehicle.inner_loop import within_half_turn
 from uas_coverage_env.world import FLYING
 
 _FEATURES = (

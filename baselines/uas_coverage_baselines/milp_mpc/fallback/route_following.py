@@ -26,14 +26,10 @@ from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission import MissionBrief, carefully, seconds_home, with_free_aims
 from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
-from uas_coverage_env.vehicle import (
-    compile_vehicle,
-    dod_per_s,
-    lpv_step,
-    reseed_reference,
-    velocity_climb_wrench,
-)
+from uas_coverage_env.vehicle import compile_vehicle, lpv_step
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
+from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import COMMAND_DTYPE, HOME, SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]

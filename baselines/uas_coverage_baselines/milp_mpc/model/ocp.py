@@ -31,7 +31,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
 )
 from uas_coverage_baselines.milp_mpc.model.milp import ELIMINATED, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
 
 
 @runtime_checkable

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal, gains, visits
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningProblem, Trajectories
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 FloatArray = NDArray[np.float64]
 _PER_METRE = 1e-4  # of two that gain the same the shorter one; a waypoint's step is worth 1
