@@ -38,7 +38,8 @@ from scipy.stats import beta
 
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import LEVELS, Scenario, generate_scenario, with_disturbances
+from uas_coverage_env.scenario import Scenario, generate_scenario, with_disturbances
+from uas_coverage_env.scenario.levels import LEVELS
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import COMMAND_DTYPE, CONTACT_NAMES, FLYING, KIND_NAMES

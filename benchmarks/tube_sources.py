@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.in_wind import position_gain
 
 from uas_coverage_env import generate_scenario
-from uas_coverage_env.scenario import LEVELS
+from uas_coverage_env.scenario.levels import LEVELS
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED

@@ -11,13 +11,13 @@ from uas_coverage_env.env import CoverageVectorEnv
 from uas_coverage_env.features import disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import (
-    LEVELS,
     GeneratedScenarios,
     Uncertainty,
-    installed_families,
     sample_scenario,
     with_disturbances,
 )
+from uas_coverage_env.scenario.families import installed_families
+from uas_coverage_env.scenario.levels import LEVELS
 from uas_coverage_env.vehicle.layout import DOD, VZ, Z
 from uas_coverage_env.vehicle.true_vehicle import CAPACITY, RESISTANCE
 from uas_coverage_env.world import Velocity, Wrench

@@ -5,15 +5,10 @@ import itertools
 import pytest
 
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import (
-    LEVELS,
-    Uncertainty,
-    Wind,
-    conditions_of,
-    load_scenario,
-    out_of_reach,
-    with_disturbances,
-)
+from uas_coverage_env.scenario import Uncertainty, Wind, load_scenario, with_disturbances
+from uas_coverage_env.scenario.checks import out_of_reach
+from uas_coverage_env.scenario.conditions import conditions_of
+from uas_coverage_env.scenario.levels import LEVELS
 
 
 def wind(mean_mps, **more):

@@ -18,8 +18,9 @@ from uas_coverage_env.flight import (
     rest_of,
 )
 from uas_coverage_env.flight.metrics import open_waypoints
-from uas_coverage_env.scenario import Room, Scenario, warnings
+from uas_coverage_env.scenario import Scenario, warnings
 from uas_coverage_env.scenario.packs import Sorties
+from uas_coverage_env.scenario.room import Room
 from uas_coverage_env.uas_coverage_v0 import parallel_env
 from uas_coverage_env.world import FLYING, SWAPPING, GoTo, Velocity
 

@@ -8,7 +8,8 @@ from uas_coverage_env import World, rollout
 from uas_coverage_env.autopilot.lookahead import fly_and_brake
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import LEVELS, with_disturbances
+from uas_coverage_env.scenario import with_disturbances
+from uas_coverage_env.scenario.levels import LEVELS
 from uas_coverage_env.world import GoTo, Velocity, build_arena
 from uas_coverage_env.world.obstacles import ROUTE_MARGIN_M
 from uas_coverage_env.world.tubes import UNKNOWN_M

@@ -19,14 +19,9 @@ from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.left_open import too_long
 from uas_coverage_env.mission import Access, Errands, MissionBrief
-from uas_coverage_env.scenario import (
-    Scenario,
-    Uas,
-    installed_families,
-    load_scenario,
-    out_of_reach,
-    scenario_names,
-)
+from uas_coverage_env.scenario import Scenario, Uas, load_scenario, scenario_names
+from uas_coverage_env.scenario.checks import out_of_reach
+from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.tube import tube_of
 from uas_coverage_env.world.arena import lookahead_steps

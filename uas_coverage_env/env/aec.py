@@ -10,7 +10,7 @@ from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
 from uas_coverage_env.env.parallel import CoverageParallelEnv
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import ScenarioLike
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.world import Command, SwarmState
 
 

@@ -47,7 +47,8 @@ from uas_coverage_env.env.state_dict import (
     records_of,
 )
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario, ScenarioLike
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.simulation import swarm_state
 from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState

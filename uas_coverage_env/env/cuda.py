@@ -36,7 +36,8 @@ from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.env.scenes import SceneChanges, SceneLane, install_scenes
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.state_dict import check_like, check_values, fields_of, records_of
-from uas_coverage_env.scenario import Scenario, installed_families
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
 

@@ -23,7 +23,8 @@ from uas_coverage_env.env.start import (
     learners_sizes,
     tables_of,
 )
-from uas_coverage_env.scenario import Room, Scenario
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.room import Room
 from uas_coverage_env.simulation import World
 from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.world import SwarmState

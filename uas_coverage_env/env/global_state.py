@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.observation.own import OWN
-from uas_coverage_env.scenario import Room
+from uas_coverage_env.scenario.room import Room
 from uas_coverage_env.world import LANDED, LOST, SWAPPING
 
 _MOVING_BOUND = 2.0

@@ -19,7 +19,8 @@ from uas_coverage_env.env.screen import RENDER_FPS, RENDER_MODES, Screen, offere
 from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario, ScenarioLike
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
 
 Observations = dict[str, Any]

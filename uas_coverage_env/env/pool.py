@@ -23,7 +23,9 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.slots import Slots
 from uas_coverage_env.env.start import first_observation, learners_sizes, tables_of
 from uas_coverage_env.features.feature import Feature, fitted_to, in_slots
-from uas_coverage_env.scenario import Room, Scenario, loaded_scenario
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.room import Room
+from uas_coverage_env.scenario.source import loaded_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.simulation.scenes import changes_scene
 from uas_coverage_env.world.arena import ARENA, Arena, build_arena

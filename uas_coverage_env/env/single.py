@@ -21,7 +21,8 @@ from uas_coverage_env.env.sequence import MissionSequence
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.spec import plain_spec
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario, ScenarioLike
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
 
 

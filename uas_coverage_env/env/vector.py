@@ -31,7 +31,8 @@ from uas_coverage_env.env.screen import RENDER_FPS, offered
 from uas_coverage_env.env.sequence import check_options
 from uas_coverage_env.env.spec import plain_spec
 from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
-from uas_coverage_env.scenario import Scenario, ScenarioLike
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.world import ABSENT, Command
 
 _MODES = {

@@ -22,7 +22,8 @@ from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.flight.policy import as_planner
 from uas_coverage_env.flight.record import LOST
 from uas_coverage_env.flight.registry import load_planner
-from uas_coverage_env.scenario import MissionSource, ScenarioLike
+from uas_coverage_env.scenario import MissionSource
+from uas_coverage_env.scenario.source import ScenarioLike
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.scenario import NoFlyZone, free_places_m
+from uas_coverage_env.scenario import NoFlyZone
+from uas_coverage_env.scenario.checks import free_places_m
 from uas_coverage_env.world import NO_WAY, Arena, build_arena, crossing, route
 from uas_coverage_env.world.corners import route_corners
 

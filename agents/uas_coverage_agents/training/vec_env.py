@@ -21,7 +21,8 @@ from uas_coverage_env.env.interface import observation_space, shown
 from uas_coverage_env.env.memory import STATUS
 from uas_coverage_env.env.state_dict import check_like, check_values
 from uas_coverage_env.env.tiles import Tiles
-from uas_coverage_env.scenario import Scenario, ScenarioLike
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.world import FLYING
 
 

@@ -60,7 +60,8 @@ from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
 from uas_coverage_env.flight.interruption import unless_stopped
-from uas_coverage_env.scenario import LEVELS, Scenario, with_disturbances
+from uas_coverage_env.scenario import Scenario, with_disturbances
+from uas_coverage_env.scenario.levels import LEVELS
 from uas_coverage_env.world import COMMAND_DTYPE
 
 CURVE_MISSIONS, SCORE_MISSIONS = 6, 40
