@@ -36,13 +36,15 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import beta
 
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, generate_scenario, with_disturbances
 from uas_coverage_env.scenario.levels import LEVELS
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.layout import DOD
-from uas_coverage_env.world import COMMAND_DTYPE, CONTACT_NAMES, FLYING, KIND_NAMES
 
 FIRST_SEED = 50_000
 _VELOCITY = KIND_NAMES.index("velocity")

@@ -51,6 +51,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
 
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
 from uas_coverage_env.autopilot import flight_home, seconds_home, seconds_to_keep
+from uas_coverage_env.entities.state import CONSUMPTION, LANDED
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
 from uas_coverage_env.scenario import with_disturbances
@@ -58,7 +59,6 @@ from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.vehicle.range import dod_per_s
-from uas_coverage_env.world import CONSUMPTION, LANDED
 
 RETURNS_OF_A_TOWN = 5
 _NEAREST_M = 15.0

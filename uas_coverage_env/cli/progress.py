@@ -13,11 +13,11 @@ from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.cli.live import LiveView
 from uas_coverage_env.cli.watch import FlightWindow
 from uas_coverage_env.draw import NoDisplayError
+from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight import Planner, Progress
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle.layout import DOD
-from uas_coverage_env.world import LANDED, LOST
 
 _SECONDS_BETWEEN_LINES = 5.0
 _NO_CHARGE = {LANDED: "landed", LOST: "lost"}

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.control import write_brake
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
-from uas_coverage_env.entities.commands import CLIMB, GO_TO, HOME, VELOCITY
-from uas_coverage_env.entities.state import STATE
+from uas_coverage_env.entities.commands import CLIMB, COMMAND_DTYPE, GO_TO, HOME, VELOCITY
+from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, ActionKind
 from uas_coverage_env.env.actions.acceleration import write as write_acceleration
 from uas_coverage_env.env.actions.velocity import write as write_velocity
@@ -31,7 +31,6 @@ from uas_coverage_env.env.memory import (
     Acting,
 )
 from uas_coverage_env.files.blocks import numbered
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING
 from uas_coverage_env.world.arena import ARENA
 
 _KIND = numbered(ACTION_NAMES, range(len(ACTIONS)))

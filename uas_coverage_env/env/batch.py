@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
-from uas_coverage_env.entities.state import STATE
+from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.actions.given import accept_of_lanes
 from uas_coverage_env.env.batch_kernel import (
@@ -51,7 +51,7 @@ from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.simulation import swarm_state
 from uas_coverage_env.simulation.flight import feature_code
-from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
+from uas_coverage_env.world import Command, SwarmState, WorldState
 from uas_coverage_env.world.arena import ARENA
 
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}

@@ -17,6 +17,7 @@ from uas_coverage_env.compiled.kernels import (
 )
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view, rows_view
+from uas_coverage_env.entities.state import ABSENT, FLYING, SWAPPING
 from uas_coverage_env.env.act import acting_of, first_not_finite
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.batch_memory import (
@@ -58,7 +59,6 @@ from uas_coverage_env.env.reward_kernel import paying_of
 from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.simulation.points import begin_features
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
-from uas_coverage_env.world import ABSENT, FLYING, SWAPPING
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import begin_events
 

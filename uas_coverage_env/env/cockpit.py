@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.entities.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH, Mode
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.act import acting_of, is_own, refuse_what_it_wrote, write_commands
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS, SCRATCH
@@ -16,7 +17,7 @@ from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import learners_sizes, tables_of
 from uas_coverage_env.mission import MissionBrief, WorldView
-from uas_coverage_env.world import FLYING, Acceleration, Command, GoTo, SwarmState, Velocity, Wrench
+from uas_coverage_env.world import Acceleration, Command, GoTo, SwarmState, Velocity, Wrench
 from uas_coverage_env.world.arena import ARENA
 
 

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot import velocity_of
-from uas_coverage_env.entities.state import STATE
+from uas_coverage_env.entities.commands import pack
+from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.actions import Actions
 from uas_coverage_env.env.drawn import DrawnPool
 from uas_coverage_env.env.memory import LEARNERS, TABLES, Learners, Tables
 from uas_coverage_env.env.pool import ScenarioPool
-from uas_coverage_env.world import FLYING, Arena, Command, GoTo, WorldState, pack
+from uas_coverage_env.world import Arena, Command, GoTo, WorldState
 from uas_coverage_env.world.arena import ARENA
 
 _ROUNDING = 1e-9

@@ -7,9 +7,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import ABSENT
 from uas_coverage_env.env.observation import ObservationBlock, observation_bounds
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.world import ABSENT
 
 
 def observation_space(settings: MissionSettings, n_uas: int = 1) -> spaces.Space[Any]:

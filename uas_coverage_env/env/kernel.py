@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
-from uas_coverage_env.entities.state import SWAPPING, as_observed
+from uas_coverage_env.entities.state import FLYING, SWAPPING, as_observed
 from uas_coverage_env.env.act import first_not_finite, write_commands
 from uas_coverage_env.env.memory import (
     CONTACT,
@@ -26,7 +26,6 @@ from uas_coverage_env.env.observation.nearest import NO_TARGET, write_around
 from uas_coverage_env.env.observe import observe_one
 from uas_coverage_env.env.reward_kernel import compute_rewards
 from uas_coverage_env.simulation import advance
-from uas_coverage_env.world import FLYING
 
 ACCEPTED = -1
 

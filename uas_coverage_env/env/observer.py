@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.memory import FIRST_OBSERVATION, LEARNERS
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
@@ -11,7 +12,7 @@ from uas_coverage_env.env.observe import observe, observing_of
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.env.start import learners_sizes, tables_of
 from uas_coverage_env.mission import MissionBrief, WorldView
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.arena import ARENA
 
 

@@ -10,6 +10,7 @@ from gymnasium.utils import seeding
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
+from uas_coverage_env.entities.state import FLYING, SWAPPING
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.express import action_of
 from uas_coverage_env.env.global_state import global_space
@@ -21,7 +22,7 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
-from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
+from uas_coverage_env.world import Command, SwarmState
 
 Observations = dict[str, Any]
 """Of each agent that acted: an array, or a dictionary with `mask_in_observation`."""

@@ -11,6 +11,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING, SWAPPING
 from uas_coverage_env.env.documentation import with_tables
 from uas_coverage_env.env.express import joint_action_of
 from uas_coverage_env.env.interface import absent, flat, observation_space, shown
@@ -23,7 +24,7 @@ from uas_coverage_env.env.spec import plain_spec
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
-from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
+from uas_coverage_env.world import Command, SwarmState
 
 
 @with_tables

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.memory import (
     CONTACT_WITH,
     COVERED,
@@ -19,7 +20,7 @@ from uas_coverage_env.env.observation.scales import scales_of
 from uas_coverage_env.env.observe import observe
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import FLYING, Arena, WorldState
+from uas_coverage_env.world import Arena, WorldState
 from uas_coverage_env.world.arena import ARENA
 
 

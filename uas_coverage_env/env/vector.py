@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import ABSENT
 from uas_coverage_env.env.batch import CoverageBatch
 from uas_coverage_env.env.batch_memory import (
     SWARM_COVERED,
@@ -33,7 +34,7 @@ from uas_coverage_env.env.spec import plain_spec
 from uas_coverage_env.env.tiles import BATCH_RENDER_MODES, Tiles
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
-from uas_coverage_env.world import ABSENT, Command
+from uas_coverage_env.world import Command
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next_step",

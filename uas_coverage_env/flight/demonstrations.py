@@ -13,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
@@ -23,7 +24,7 @@ from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import SwarmState
 
 UNKNOWN_CHOICE = -1
 """The choice where the waypoint that came next was not among those to choose from."""

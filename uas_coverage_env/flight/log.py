@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import interpreted
-from uas_coverage_env.entities.outcome import FAULT, NONE
+from uas_coverage_env.entities.commands import command_mode
+from uas_coverage_env.entities.outcome import CONTACT_NAMES, FAULT, NONE
+from uas_coverage_env.entities.state import FLYING, SWAPPING
+from uas_coverage_env.entities.state import LOST as IS_LOST
 from uas_coverage_env.env.meter import RewardMeter
 from uas_coverage_env.features.event import OfUas
 from uas_coverage_env.flight.planner import Decision
@@ -32,8 +35,7 @@ from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.discharge import open_circuit_V
 from uas_coverage_env.vehicle.limits import LIMIT_NAMES, N_LIMITS, write_limited
-from uas_coverage_env.world import CONTACT_NAMES, FLYING, SWAPPING, Command, command_mode
-from uas_coverage_env.world import LOST as IS_LOST
+from uas_coverage_env.world import Command
 
 
 @dataclass(frozen=True)

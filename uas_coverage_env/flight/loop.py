@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
+from uas_coverage_env.entities.commands import pack
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.env.meter import RewardMeter
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.features import Feature
@@ -32,7 +34,7 @@ from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import Dynamics, World
 from uas_coverage_env.vehicle.layout import Z
-from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Velocity, pack
+from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 from uas_coverage_env.world.packs import swaps_alone
 
 _RECORDED_PACKAGES = (

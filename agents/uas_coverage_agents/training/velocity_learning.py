@@ -56,13 +56,12 @@ from uas_coverage_agents.training.scenarios import town, validation_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly, score
 from uas_coverage_env.autopilot import velocity_of
 from uas_coverage_env.autopilot.control import write_command
-from uas_coverage_env.entities.commands import VELOCITY
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
 from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.scenario import Scenario, with_disturbances
 from uas_coverage_env.scenario.levels import LEVELS
-from uas_coverage_env.world import COMMAND_DTYPE
 
 CURVE_MISSIONS, SCORE_MISSIONS = 6, 40
 _RETREATS = [

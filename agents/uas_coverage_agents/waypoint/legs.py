@@ -16,8 +16,9 @@ from uas_coverage_env.vehicle.range import (
     SpeedLimits,
     flight_seconds,
 )
-from uas_coverage_env.world import Arena, route
+from uas_coverage_env.world import Arena
 from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.routes import route
 
 ROUTED_UNITS = 6.0
 """Longer legs than this are rarely flown: they are taken straight."""

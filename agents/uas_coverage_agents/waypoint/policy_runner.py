@@ -24,6 +24,9 @@ from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
 from uas_coverage_agents.waypoint.search import Moment, Workspace, improve, no_plan, planned
 from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, flight_code, next_to_decide
 from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import (
     GuidedFlight,
@@ -32,15 +35,7 @@ from uas_coverage_env.mission import (
     WorldView,
     first_sight,
 )
-from uas_coverage_env.world import (
-    COMMAND_DTYPE,
-    FLYING,
-    OUTCOME_DTYPE,
-    Command,
-    GoTo,
-    SwarmState,
-    WorldState,
-)
+from uas_coverage_env.world import Command, GoTo, SwarmState, WorldState
 
 
 def network(hidden: int, prior: float) -> Pointer:

@@ -28,7 +28,8 @@ from uas_coverage_agents.waypoint.team import (
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.views import copy_arrays
-from uas_coverage_env.world import HOME, WorldState
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.world import WorldState
 
 PRICES_WH = {ENERGY: 1.0, TIME: 0.1, LEFT: 20.0, LOST_UAS: 100.0, NOT_HOME: 100.0}
 """What a mission costs [Wh]: as in training, energy and the time of the team; see `settings`."""

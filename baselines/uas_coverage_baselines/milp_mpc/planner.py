@@ -9,8 +9,9 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import ModeOptions, MovingHorizonOptions
+from uas_coverage_env.entities.commands import Mode
 from uas_coverage_env.mission import MissionBrief, Ways
-from uas_coverage_env.world import Mode, SwarmState
+from uas_coverage_env.world import SwarmState
 
 
 class MilpMpcOptions(MovingHorizonOptions, ModeOptions):

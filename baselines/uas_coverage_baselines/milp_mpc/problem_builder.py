@@ -24,13 +24,14 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     Weights,
 )
 from uas_coverage_baselines.milp_mpc.options import OcpOptions
+from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.geometry import inner_factor
 from uas_coverage_env.mission import MissionBrief, Way, Ways, WorldView
 from uas_coverage_env.scenario import Uas
 from uas_coverage_env.vehicle import VehicleParams, linear_model
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import dod_per_s
-from uas_coverage_env.world import HOME, SwarmState
+from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 

@@ -16,6 +16,8 @@ from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve
 from uas_coverage_baselines.tour.pursuit import LEGS, PursuitTask, brake_seconds, empty_plan
 from uas_coverage_baselines.tour.schedule import Schedule, View
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import (
@@ -31,15 +33,7 @@ from uas_coverage_env.mission import (
     without,
 )
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import (
-    COMMAND_DTYPE,
-    FLYING,
-    Arena,
-    Command,
-    GoTo,
-    SwarmState,
-    Velocity,
-)
+from uas_coverage_env.world import Arena, Command, GoTo, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
 _HORIZON_S = 8.0  # a longer plan has more in it than so many changes can improve

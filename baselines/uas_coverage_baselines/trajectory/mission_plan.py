@@ -30,7 +30,8 @@ from uas_coverage_baselines.trajectory.program import Flight
 from uas_coverage_baselines.trajectory.retiming import Draft
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import Work, done
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -28,6 +28,7 @@ from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import ProgramOf, tracked
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import (
     Handover,
@@ -39,7 +40,7 @@ from uas_coverage_env.mission import (
     without,
 )
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Wrench
+from uas_coverage_env.world import Command, GoTo, SwarmState, Wrench
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

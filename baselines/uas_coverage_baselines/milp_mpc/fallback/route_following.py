@@ -24,13 +24,14 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.autopilot import guide
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
 from uas_coverage_env.mission import MissionBrief, carefully, seconds_home, with_free_aims
 from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
 from uas_coverage_env.vehicle import compile_vehicle, lpv_step
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
 from uas_coverage_env.vehicle.range import dod_per_s
-from uas_coverage_env.world import COMMAND_DTYPE, HOME, SwarmState, build_arena
+from uas_coverage_env.world import SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]
 _PURSUED_S = (8.0, 4.0, 2.0, 1.0)  # how long the way home is followed before the brakes
