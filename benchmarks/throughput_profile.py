@@ -32,8 +32,8 @@ from uas_coverage_env.env.observe import observe_one, observing_of
 from uas_coverage_env.env.pool import learners_of, tables_at
 from uas_coverage_env.env.reward_kernel import compute_rewards, paying_of
 from uas_coverage_env.env.rewards import REWARD
-from uas_coverage_env.simulation import advance
 from uas_coverage_env.simulation.pool import arena_of, state_of
+from uas_coverage_env.simulation.step import advance
 from uas_coverage_env.vehicle import lpv_step
 from uas_coverage_env.vehicle.layout import N_STATES
 from uas_coverage_env.world.arena import ARENA

@@ -22,7 +22,7 @@ from waypoint_oracle import Mission, observation
 
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.entities.state import LANDED
-from uas_coverage_env.simulation import initial_state
+from uas_coverage_env.simulation.world import initial_state
 from uas_coverage_env.vehicle.layout import DOD, VX, VZ
 from uas_coverage_env.world import build_arena
 

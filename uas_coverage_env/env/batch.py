@@ -49,8 +49,8 @@ from uas_coverage_env.env.state_dict import (
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
-from uas_coverage_env.simulation import swarm_state
 from uas_coverage_env.simulation.flight import feature_code
+from uas_coverage_env.simulation.world import swarm_state
 from uas_coverage_env.world import Command, SwarmState, WorldState
 from uas_coverage_env.world.arena import ARENA
 

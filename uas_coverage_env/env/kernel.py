@@ -25,7 +25,7 @@ from uas_coverage_env.env.memory import (
 from uas_coverage_env.env.observation.nearest import NO_TARGET, write_around
 from uas_coverage_env.env.observe import observe_one
 from uas_coverage_env.env.reward_kernel import compute_rewards
-from uas_coverage_env.simulation import advance
+from uas_coverage_env.simulation.step import advance
 
 ACCEPTED = -1
 

@@ -23,7 +23,7 @@ from uas_coverage_env.entities.commands import COMMAND_DTYPE, GO_TO, HOME, VELOC
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.mission import find_blocked
-from uas_coverage_env.simulation import advance
+from uas_coverage_env.simulation.step import advance
 from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world.arena import ARENA
 

@@ -24,7 +24,7 @@ from uas_coverage_baselines.routing.search import (
 from uas_coverage_baselines.routing.task import GROUND_S, RoutingTask
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.simulation import initial_state
+from uas_coverage_env.simulation.world import initial_state
 from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.packs import pack_records, swaps_alone
 
