@@ -37,7 +37,7 @@ from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env import Flight, generate_scenario, load_planner, load_scenario, rollout
-from uas_coverage_env.geometry import inner_factor
+from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import SwarmState

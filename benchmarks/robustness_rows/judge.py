@@ -9,7 +9,8 @@ from flight_distances import cylinder_distance, hull_distance, least_on_segments
 from numpy.typing import NDArray
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
-from uas_coverage_env.geometry import ConvexPolytope, cylinder_clearance, segment_clearance
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
 
 FIRST_SEED = 12000
 SEGMENTS = 1000

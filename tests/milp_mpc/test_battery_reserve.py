@@ -22,7 +22,7 @@ from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, wr
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
-from uas_coverage_env.geometry import inner_factor
+from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
 from uas_coverage_env.vehicle.layout import DOD

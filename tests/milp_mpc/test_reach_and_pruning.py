@@ -11,7 +11,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import Target
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
-from uas_coverage_env.geometry import closed_cylinder_faces, sphere_faces
+from uas_coverage_env.geometry import sphere_faces
+from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
 from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.layout import VX, VY
 

@@ -7,7 +7,11 @@ from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import kernel, rare_kernel, stack_array
 from uas_coverage_env.entities.commands import WRENCH
 from uas_coverage_env.entities.state import FLYING, WIND
-from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
+from uas_coverage_env.geometry.segments import (
+    cylinder_clearance,
+    segment_clearance,
+    signed_distance,
+)
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle import plant_step
 from uas_coverage_env.vehicle.inner_loop import reseed_reference

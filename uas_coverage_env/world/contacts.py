@@ -16,7 +16,7 @@ from uas_coverage_env.entities.outcome import (
     UAS,
 )
 from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.geometry import (
+from uas_coverage_env.geometry.segments import (
     cylinder_clearance,
     cylinder_gap,
     outside_cylinder,

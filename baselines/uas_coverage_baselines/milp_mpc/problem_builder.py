@@ -25,7 +25,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 )
 from uas_coverage_baselines.milp_mpc.options import OcpOptions
 from uas_coverage_env.entities.commands import HOME
-from uas_coverage_env.geometry import inner_factor
+from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.mission import MissionBrief, Way, Ways, WorldView
 from uas_coverage_env.scenario import Uas
 from uas_coverage_env.vehicle import VehicleParams, linear_model

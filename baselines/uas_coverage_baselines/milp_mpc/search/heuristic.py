@@ -24,7 +24,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 )
 from uas_coverage_baselines.milp_mpc.search.trajectories import Trajectory
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.geometry import signed_distance, sphere_faces
+from uas_coverage_env.geometry import sphere_faces
+from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import compile_vehicle
 from uas_coverage_env.vehicle.inner_loop import velocity_climb_wrench
 from uas_coverage_env.vehicle.layout import N_INPUTS, VX, VY, VZ, X, Y, Z
