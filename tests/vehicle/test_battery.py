@@ -7,7 +7,7 @@ from small_worlds import meadow
 from uas_coverage_env import World, linear_model, load_vehicle, simulate_battery
 from uas_coverage_env.bound.prices import Ends, energy_prices
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.features import uncertainty
+from uas_coverage_env.features.parameter_errors import uncertainty
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, Uncertainty
 from uas_coverage_env.scenario.packs import Sorties
