@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env import GoTo, Scenario, World, generate_scenario
-from uas_coverage_env.autopilot import has_to_return, seconds_home, seconds_to_keep
+from uas_coverage_env.autopilot.return_mode import has_to_return, seconds_home, seconds_to_keep
 from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.entities.state import CONSUMPTION, LANDED
 from uas_coverage_env.simulation import Dynamics

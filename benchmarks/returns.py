@@ -50,7 +50,8 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
 )
 
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
-from uas_coverage_env.autopilot import flight_home, seconds_home, seconds_to_keep
+from uas_coverage_env.autopilot.return_mode import seconds_home, seconds_to_keep
+from uas_coverage_env.autopilot.return_path import flight_home
 from uas_coverage_env.entities.state import CONSUMPTION, LANDED
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range

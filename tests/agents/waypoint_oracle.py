@@ -9,7 +9,7 @@ import math
 import numpy as np
 from uas_coverage_agents.waypoint.layout import CRUISE_SHARE, K
 
-from uas_coverage_env.autopilot import path_length_home_m
+from uas_coverage_env.autopilot.guidance import path_length_home_m
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.vehicle.layout import DOD, VX, VY, X, Y, Z

@@ -8,8 +8,7 @@ import pytest
 from numba import njit
 from numba.core.errors import TypingError
 
-from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.autopilot.assist import assist
+from uas_coverage_env.autopilot.assist import assist, assistants
 from uas_coverage_env.autopilot.guidance import steer
 from uas_coverage_env.autopilot.return_mode import call_home
 from uas_coverage_env.autopilot.safety import filter_commands

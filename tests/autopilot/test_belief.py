@@ -8,8 +8,8 @@ import pytest
 from small_worlds import meadow
 
 from uas_coverage_env import load_scenario, rollout
-from uas_coverage_env.autopilot import seconds_to_keep
 from uas_coverage_env.autopilot.belief import learn, speed_along
+from uas_coverage_env.autopilot.return_mode import seconds_to_keep
 from uas_coverage_env.entities.state import CONSUMPTION, LANDED, N_BELIEF, WIND
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.flight.record import LANDED as FLIGHT_LANDED

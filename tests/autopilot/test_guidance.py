@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot import path_length_home_m, seconds_home
+from uas_coverage_env.autopilot.guidance import path_length_home_m
+from uas_coverage_env.autopilot.return_mode import seconds_home
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.simulation import World

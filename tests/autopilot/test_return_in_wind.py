@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot import has_to_return
+from uas_coverage_env.autopilot.return_mode import has_to_return
 from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.features.wind import Gust, Wind

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot import seconds_home, seconds_to_keep
+from uas_coverage_env.autopilot.return_mode import seconds_home, seconds_to_keep
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World

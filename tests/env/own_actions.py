@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from uas_coverage_env.autopilot import write_brake, write_command
+from uas_coverage_env.autopilot import write_command
+from uas_coverage_env.autopilot.control import write_brake
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.entities.commands import CLIMB, GO_TO, HOME, VELOCITY
 from uas_coverage_env.env import ActionKind

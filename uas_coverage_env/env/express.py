@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import velocity_of
+from uas_coverage_env.autopilot.guidance import velocity_of
 from uas_coverage_env.entities.commands import pack
 from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.actions import Actions

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import flight_home as seconds_home
+from uas_coverage_env.autopilot.return_path import flight_home as seconds_home
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.vehicle.range import dod_per_s

@@ -54,8 +54,8 @@ from uas_coverage_agents.training import curve
 from uas_coverage_agents.training.checkpoint import CurvePoint
 from uas_coverage_agents.training.scenarios import town, validation_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly, score
-from uas_coverage_env.autopilot import velocity_of
 from uas_coverage_env.autopilot.control import write_command
+from uas_coverage_env.autopilot.guidance import velocity_of
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout

@@ -20,7 +20,7 @@ from uas_coverage_agents.waypoint.layout import (
     K,
 )
 from uas_coverage_agents.waypoint.legs import home_leg_s, leg_s
-from uas_coverage_env.autopilot import path_length_home_m
+from uas_coverage_env.autopilot.guidance import path_length_home_m
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.entities.state import FLYING

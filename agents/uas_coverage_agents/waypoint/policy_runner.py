@@ -23,7 +23,7 @@ from uas_coverage_agents.waypoint.observation import NO_TARGET
 from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
 from uas_coverage_agents.waypoint.search import Moment, Workspace, improve, no_plan, planned
 from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, flight_code, next_to_decide
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.entities.commands import COMMAND_DTYPE
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import FLYING

@@ -16,7 +16,7 @@ from uas_coverage_agents.waypoint.observation import (
     covers,
     observe,
 )
-from uas_coverage_env.autopilot import has_to_return
+from uas_coverage_env.autopilot.return_mode import has_to_return
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, GO_TO, HOME, VELOCITY

@@ -25,8 +25,7 @@ from uas_coverage_baselines.trajectory.course import (
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.space import spare_of_rules_m
-from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.autopilot.assist import assist
+from uas_coverage_env.autopilot.assist import assist, assistants
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import GO_TO, HOME, WRENCH

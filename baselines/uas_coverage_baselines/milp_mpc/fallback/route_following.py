@@ -21,8 +21,8 @@ from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, prolonged
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_env.autopilot import guide
 from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.autopilot.guidance import guide
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
 from uas_coverage_env.mission import MissionBrief, carefully, seconds_home, with_free_aims
