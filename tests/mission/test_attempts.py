@@ -7,8 +7,9 @@ import pytest
 from hard_missions import TOWER, mission
 
 from uas_coverage_env.entities.commands import HOME
-from uas_coverage_env.mission import Attempts, first_sight, with_free_aims
-from uas_coverage_env.mission.attempts import PATIENCE_S
+from uas_coverage_env.mission import first_sight
+from uas_coverage_env.mission.approach import with_free_aims
+from uas_coverage_env.mission.attempts import PATIENCE_S, Attempts
 
 
 @pytest.fixture

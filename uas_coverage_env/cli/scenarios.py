@@ -18,7 +18,9 @@ from uas_coverage_env.draw import legend, picture
 from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.left_open import too_long
-from uas_coverage_env.mission import Access, Errands, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.access import Access
+from uas_coverage_env.mission.errands import Errands
 from uas_coverage_env.scenario import Scenario, Uas, load_scenario, scenario_names
 from uas_coverage_env.scenario.checks import out_of_reach
 from uas_coverage_env.scenario.families import installed_families

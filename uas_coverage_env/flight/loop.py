@@ -28,7 +28,8 @@ from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
-from uas_coverage_env.mission import MissionBrief, Relaunch
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.relaunch import Relaunch
 from uas_coverage_env.plugins.installed import version_of
 from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario

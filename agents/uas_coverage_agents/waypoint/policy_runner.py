@@ -28,13 +28,8 @@ from uas_coverage_env.entities.commands import COMMAND_DTYPE
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import (
-    GuidedFlight,
-    Handover,
-    MissionBrief,
-    WorldView,
-    first_sight,
-)
+from uas_coverage_env.mission import GuidedFlight, MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission.handover import Handover
 from uas_coverage_env.world import Command, GoTo, SwarmState, WorldState
 
 

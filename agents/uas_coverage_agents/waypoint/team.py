@@ -22,7 +22,7 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, GO_TO, HOME, VELOCITY
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import FLYING, STATE
-from uas_coverage_env.mission import find_blocked
+from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.simulation.step import advance
 from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world.arena import ARENA

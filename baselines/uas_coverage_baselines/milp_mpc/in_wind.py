@@ -28,8 +28,8 @@ from scipy.linalg import solve_discrete_are
 
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.entities.commands import Mode
-from uas_coverage_env.mission import LearntWind, MissionBrief
-from uas_coverage_env.mission.learnt_wind import axes
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.learnt_wind import LearntWind, axes
 from uas_coverage_env.vehicle import LinearModel, VehicleParams
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis

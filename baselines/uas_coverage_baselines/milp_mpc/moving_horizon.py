@@ -29,14 +29,10 @@ from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.entities.commands import HOME, Mode
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import (
-    Attempts,
-    Handover,
-    MissionBrief,
-    first_sight,
-    refuse_what_asks,
-    without,
-)
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.attempts import Attempts
+from uas_coverage_env.mission.handover import Handover, without
+from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 _CAREFUL_WITHIN_M = 40.0  # of home a UAS that does not come nearer to it flies slowly

@@ -32,7 +32,8 @@ from uas_coverage_baselines.milp_mpc.solvers import (
 )
 from uas_coverage_env.entities.commands import Mode
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import MissionBrief, first_sight, refuse_what_asks
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.world import Command, SwarmState
 
 _ROUNDING_M = 1e-5  # a solution keeps its rows to 2e-6, and a breach is one by any amount

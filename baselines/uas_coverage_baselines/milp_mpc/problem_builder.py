@@ -26,7 +26,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 from uas_coverage_baselines.milp_mpc.options import OcpOptions
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.geometry.round_shapes import inner_factor
-from uas_coverage_env.mission import MissionBrief, Way, Ways, WorldView
+from uas_coverage_env.mission import MissionBrief, Ways, WorldView
+from uas_coverage_env.mission.ways import Way
 from uas_coverage_env.scenario import Uas
 from uas_coverage_env.vehicle import VehicleParams, linear_model
 from uas_coverage_env.vehicle import layout as S

@@ -20,18 +20,10 @@ from uas_coverage_env.entities.commands import COMMAND_DTYPE
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import (
-    GuidedFlight,
-    Handover,
-    LearntWind,
-    MissionBrief,
-    Recall,
-    Repeats,
-    WorldView,
-    first_sight,
-    in_disturbances,
-    without,
-)
+from uas_coverage_env.mission import GuidedFlight, MissionBrief, Repeats, WorldView, first_sight
+from uas_coverage_env.mission.handover import Handover, without
+from uas_coverage_env.mission.learnt_wind import LearntWind, in_disturbances
+from uas_coverage_env.mission.recall import Recall
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import Arena, Command, GoTo, SwarmState, Velocity
 

@@ -30,7 +30,8 @@ from uas_coverage_baselines.trajectory.retiming import (
 )
 from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_baselines.trajectory.work import Work, done
-from uas_coverage_env.mission import Access, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.access import Access
 from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState

@@ -31,7 +31,8 @@ from uas_coverage_baselines.trajectory.program import Air, Flight, FlightProgram
 from uas_coverage_baselines.trajectory.retiming import draft, finished, retimed, shorten
 from uas_coverage_baselines.trajectory.work import done
 from uas_coverage_env.autopilot.belief import wind_growth
-from uas_coverage_env.mission import MEAN_HEIGHT_M, LearntWind, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind
 from uas_coverage_env.vehicle.governor import ON_RATE, ON_SPEED, ON_TILT, design_velocity_loop
 from uas_coverage_env.world import Arena
 

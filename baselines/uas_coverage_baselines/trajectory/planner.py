@@ -30,15 +30,8 @@ from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import (
-    Handover,
-    MissionBrief,
-    Range,
-    Repeats,
-    WorldView,
-    first_sight,
-    without,
-)
+from uas_coverage_env.mission import MissionBrief, Range, Repeats, WorldView, first_sight
+from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import Command, GoTo, SwarmState, Wrench
 

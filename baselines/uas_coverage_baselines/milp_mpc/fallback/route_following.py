@@ -23,9 +23,11 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.autopilot.guidance import guide
+from uas_coverage_env.autopilot.return_path import flight_home as seconds_home
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
-from uas_coverage_env.mission import MissionBrief, carefully, seconds_home, with_free_aims
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.approach import carefully, with_free_aims
 from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
 from uas_coverage_env.vehicle import compile_vehicle, lpv_step
 from uas_coverage_env.vehicle import layout as S
