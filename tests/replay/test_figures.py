@@ -13,17 +13,15 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, DecisionRecord
 from uas_coverage_env.replay.figures import (
     KINDS,
-    WIDTH_IN,
     battery_figure,
     decision_time_figure,
-    learning_curve,
-    look,
     modes_figure,
     save_figure,
     training_figure,
-    with_baselines,
 )
 from uas_coverage_env.replay.figures.battery import published_battery
+from uas_coverage_env.replay.figures.style import WIDTH_IN, look
+from uas_coverage_env.replay.figures.training import learning_curve, with_baselines
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -70,12 +70,9 @@ def figure(
     if len(directories) > 1 and kind != _TRAINING:
         raise InputError(f"--kind {kind} shows one directory; {len(directories)} were given")
     try:
-        from uas_coverage_env.replay.figures import (
-            CURVE,
-            WIDTH_IN,
-            look,
-            save_figure,
-        )
+        from uas_coverage_env.replay.figures import save_figure
+        from uas_coverage_env.replay.figures.style import WIDTH_IN, look
+        from uas_coverage_env.replay.figures.training import CURVE
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
             raise
@@ -91,7 +88,8 @@ def figure(
 
 
 def _drawn(directories: list[Path], kind: str, step: int | None) -> "Figure":
-    from uas_coverage_env.replay.figures import KINDS, map_figure, training_figure, with_baselines
+    from uas_coverage_env.replay.figures import KINDS, map_figure, training_figure
+    from uas_coverage_env.replay.figures.training import with_baselines
 
     if kind == _LEADERBOARD:
         rows, reference = published(directories[0])

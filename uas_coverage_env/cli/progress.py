@@ -12,7 +12,7 @@ from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.cli.live import LiveView
 from uas_coverage_env.cli.watch import FlightWindow
-from uas_coverage_env.draw import NoDisplayError
+from uas_coverage_env.draw.window import NoDisplayError
 from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight import Planner, Progress

@@ -14,7 +14,8 @@ from rich.table import Table
 
 from uas_coverage_env.cli import completion
 from uas_coverage_env.cli.output import console, loaded
-from uas_coverage_env.draw import legend, picture
+from uas_coverage_env.draw import picture
+from uas_coverage_env.draw.signs import legend
 from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.left_open import too_long

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import Picture, legend
+from uas_coverage_env.draw import Picture
+from uas_coverage_env.draw.signs import legend
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.entities.state import LANDED as HAS_LANDED
 from uas_coverage_env.entities.state import LOST as IS_LOST

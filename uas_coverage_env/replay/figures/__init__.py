@@ -16,16 +16,8 @@ from uas_coverage_env.replay.figures.battery import battery_figure, published_ba
 from uas_coverage_env.replay.figures.decision_time import decision_time_figure
 from uas_coverage_env.replay.figures.map import map_figure
 from uas_coverage_env.replay.figures.modes import modes_figure
-from uas_coverage_env.replay.figures.style import WIDTH_IN, look, printed
-from uas_coverage_env.replay.figures.training import (
-    BASELINES,
-    CURVE,
-    Curve,
-    baseline_curves,
-    learning_curve,
-    training_figure,
-    with_baselines,
-)
+from uas_coverage_env.replay.figures.style import printed
+from uas_coverage_env.replay.figures.training import training_figure
 
 KINDS: dict[str, Callable[[Flight], Figure]] = {
     "map": map_figure,
@@ -35,23 +27,14 @@ KINDS: dict[str, Callable[[Flight], Figure]] = {
 }
 
 __all__ = [
-    "BASELINES",
-    "CURVE",
     "KINDS",
-    "WIDTH_IN",
-    "Curve",
-    "baseline_curves",
     "battery_figure",
     "decision_time_figure",
-    "learning_curve",
-    "look",
     "map_figure",
     "modes_figure",
-    "png_of",
     "published_battery",
     "save_figure",
     "training_figure",
-    "with_baselines",
 ]
 
 
