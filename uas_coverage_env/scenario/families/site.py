@@ -198,10 +198,10 @@ class Square(NamedTuple):
         corners_m = outline((0.0, self.side_m), (0.0, self.west_m + self.side_m))
         return Site(corners_m, obstacles, **more)
 
-    def grid(self, rng: Rng, count: int, inside: Inside = _anywhere) -> list[Place_m]:
-        """`grid` over the square but for its margin."""
+    def spread_places(self, rng: Rng, count: int, inside: Inside = _anywhere) -> list[Place_m]:
+        """`spread_places` over the square but for its margin."""
         least, most = MARGIN_M, self.side_m - MARGIN_M
-        return grid(rng, (least, most), (self.west_m + least, self.west_m + most), count, inside)
+        return spread_places(rng, (least, most), (self.west_m + least, self.west_m + most), count, inside)
 
 
 def tag(rng: Rng) -> str:
@@ -240,7 +240,7 @@ def upright(corners_m: Sequence[Place_m], base_m: float, height_m: float) -> Ver
     )
 
 
-def grid(
+def spread_places(
     rng: Rng,
     north_m: tuple[float, float],
     east_m: tuple[float, float],
