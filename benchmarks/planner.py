@@ -23,11 +23,12 @@ from rich.console import Console
 from rich.table import Table
 from solver_watch import SECONDS, Watched, watch
 from uas_coverage_baselines.milp_mpc import MilpMpc
-from uas_coverage_baselines.milp_mpc.model.blocks import coverable
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
-from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, Formulation
+from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
+from uas_coverage_baselines.milp_mpc.model.reductions.formulations import Formulation
 from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.by_legs import LegFollower
+from uas_coverage_baselines.by_legs.follower import LegFollower
 from uas_coverage_baselines.targets import Targets, warm_up_once
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import MissionBrief

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
-from uas_coverage_baselines.by_legs import LegFollower
 from uas_coverage_baselines.by_legs.course import CoursePlanner
+from uas_coverage_baselines.by_legs.follower import LegFollower
 
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.flight.metrics import coverage

@@ -17,8 +17,9 @@ from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import NARROW, WIDE, RestrictedMilp
 from uas_coverage_baselines.milp_mpc.search.trajectories import Trajectory, teams
-from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 
 from uas_coverage_env.geometry import sphere_faces
 from uas_coverage_env.vehicle.layout import PHI, THETA, VX, WY

@@ -13,8 +13,9 @@ from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.blocks import Capabilities, Dynamics
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
-from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, accomplished, load_planner, rollout

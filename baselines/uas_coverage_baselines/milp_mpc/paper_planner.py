@@ -24,12 +24,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.options import ModeOptions, with_default
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
-from uas_coverage_baselines.milp_mpc.solvers import (
-    SolverError,
-    SolverLimits,
-    SolveStatus,
-    solver_named,
-)
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolverError, SolveStatus
 from uas_coverage_env.entities.commands import Mode
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import MissionBrief, first_sight

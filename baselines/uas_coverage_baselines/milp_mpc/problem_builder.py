@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
 from uas_coverage_baselines.milp_mpc.getaway import getaway_margin_m
-from uas_coverage_baselines.milp_mpc.model.blocks import coverable
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
     seconds_home,
     seconds_onward,
 )
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.model.problem import (
     MovingHull,

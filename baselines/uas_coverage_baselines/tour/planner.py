@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from uas_coverage_baselines.by_legs import LegMission
+from uas_coverage_baselines.by_legs.mission import LegMission
 from uas_coverage_baselines.routing import Routes, SearchEffort
 from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve

@@ -8,15 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import (
-    FreshPacks,
-    Packs,
     Routes,
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
-    improve_trips,
 )
+from uas_coverage_baselines.routing.trips import FreshPacks, Packs, improve_trips
 from uas_coverage_env.mission import Legs, MissionBrief
 from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M
 from uas_coverage_env.planning.reserves import TOUR, TOUR_RESERVE, TOUR_SCARCE_RESERVE

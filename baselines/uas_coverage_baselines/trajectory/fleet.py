@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import FreshPacks, Packs, RoutingTask
+from uas_coverage_baselines.routing import RoutingTask
 from uas_coverage_baselines.routing.terrain import Terrain
+from uas_coverage_baselines.routing.trips import FreshPacks, Packs
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
 from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.program import (

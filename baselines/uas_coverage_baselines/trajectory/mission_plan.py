@@ -9,14 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import (
-    FreshPacks,
-    Routes,
-    RoutingTask,
-    SearchEffort,
-    empty_routes,
-    improve_trips,
-)
+from uas_coverage_baselines.routing import Routes, RoutingTask, SearchEffort, empty_routes
+from uas_coverage_baselines.routing.trips import FreshPacks, improve_trips
 from uas_coverage_baselines.trajectory.closed_off import closed_off
 from uas_coverage_baselines.trajectory.course import (
     Course,

@@ -27,8 +27,8 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
     Slack,
     TargetDistance,
     TimeToGo,
-    coverable,
 )
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.milp import ELIMINATED, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES

@@ -27,13 +27,12 @@ from uas_coverage_baselines.milp_mpc.search.trajectories import (
     as_trajectory,
     teams,
 )
-from uas_coverage_baselines.milp_mpc.solvers import (
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
+from uas_coverage_baselines.milp_mpc.solvers.interface import (
     Solution,
     SolverError,
-    SolverLimits,
     SolveStatus,
     Start,
-    solver_named,
 )
 
 FloatArray = NDArray[np.float64]

@@ -4,7 +4,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import Battery
 from uas_coverage_baselines.milp_mpc.model.blocks.capabilities import Capabilities
 from uas_coverage_baselines.milp_mpc.model.blocks.collision import Collision
 from uas_coverage_baselines.milp_mpc.model.blocks.corner_cutting import CornerCutting
-from uas_coverage_baselines.milp_mpc.model.blocks.coverage import Coverage, coverable
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import Coverage
 from uas_coverage_baselines.milp_mpc.model.blocks.dynamics import Dynamics
 from uas_coverage_baselines.milp_mpc.model.blocks.geofence import Geofence
 from uas_coverage_baselines.milp_mpc.model.blocks.min_height import MinHeight
@@ -28,5 +28,4 @@ __all__ = [
     "Slack",
     "TargetDistance",
     "TimeToGo",
-    "coverable",
 ]
