@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from uas_coverage_agents.policy import Mlp, Towns, load_policy, save_policy
+from uas_coverage_agents.policy import load_policy, save_policy
+from uas_coverage_agents.policy.description import Towns
+from uas_coverage_agents.policy.mlp import Mlp
 from uas_coverage_agents.policy.planner import PolicyPlanner
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.layers import layers_of

@@ -17,13 +17,8 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from uas_coverage_agents.policy import (
-    PolicyDescription,
-    ScenarioFamily,
-    Towns,
-    Training,
-    save_policy,
-)
+from uas_coverage_agents.policy import PolicyDescription, save_policy
+from uas_coverage_agents.policy.description import ScenarioFamily, Towns, Training
 from uas_coverage_agents.route.clock import DONE, IN_THE_AIR, Mission
 from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.layout import route_networks

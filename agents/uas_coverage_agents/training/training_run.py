@@ -15,13 +15,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.policy import (
-    Policy,
-    PolicyDescription,
-    Training,
-    load_policy,
-    save_policy,
-)
+from uas_coverage_agents.policy import Policy, PolicyDescription, load_policy, save_policy
+from uas_coverage_agents.policy.description import Training
 from uas_coverage_agents.training.config import TrainingConfig
 from uas_coverage_agents.training.learner import Learner
 from uas_coverage_agents.training.learners import learner_of

@@ -23,15 +23,8 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from uas_coverage_agents.policy import (
-    Policy,
-    PolicyDescription,
-    ScenarioFamily,
-    Towns,
-    Training,
-    load_policy,
-    save_policy,
-)
+from uas_coverage_agents.policy import Policy, PolicyDescription, load_policy, save_policy
+from uas_coverage_agents.policy.description import ScenarioFamily, Towns, Training
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.leg_flight import (
