@@ -42,7 +42,7 @@ from uas_coverage_env.leaderboard import (
 )
 from uas_coverage_env.leaderboard import table as tables
 from uas_coverage_env.scenario import Scenario, warnings
-from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.simulation.world import DynamicsName
 
 _REFERENCE = "nearest-waypoint"
 _MOST_FLIGHTS = 1_000_000
@@ -86,7 +86,7 @@ def compare(
         bool, typer.Option("--filter", help="Switch the safety filter on for all planners.")
     ] = False,
     dynamics: Annotated[
-        Dynamics, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
+        DynamicsName, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
     ] = "lpv",
     backend: Annotated[
         Backend, typer.Option(help="Processes here, or a Ray cluster (RAY_ADDRESS, else local).")

@@ -30,7 +30,7 @@ from uas_coverage_env.flight import (
     rollout,
 )
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.simulation.world import DynamicsName
 
 
 def run(
@@ -59,7 +59,7 @@ def run(
         int | None, typer.Option(min=1, help="Stop after this many steps (exit code 0).")
     ] = None,
     dynamics: Annotated[
-        Dynamics, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
+        DynamicsName, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
     ] = "lpv",
     sorties: Annotated[
         int | None,

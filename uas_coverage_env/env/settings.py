@@ -14,7 +14,7 @@ from uas_coverage_env.env.rewards import REWARD, RewardTerm, weights_of
 from uas_coverage_env.features.feature import Feature, checked_features
 from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.simulation.world import DynamicsName
 from uas_coverage_env.world.packs import mission_features
 
 _LONGEST = 100_000
@@ -59,7 +59,7 @@ class MissionSettings:
     """
 
     action: str | ActionKind = "velocity"
-    dynamics: Dynamics = "lpv"
+    dynamics: DynamicsName = "lpv"
     return_mode: bool = False
     safety_filter: bool = False
     reward_weights: Mapping[str, float] | None = None
@@ -73,8 +73,8 @@ class MissionSettings:
 
     def __post_init__(self) -> None:
         kind_of(self.action)
-        if self.dynamics not in get_args(Dynamics):
-            allowed = ", ".join(get_args(Dynamics))
+        if self.dynamics not in get_args(DynamicsName):
+            allowed = ", ".join(get_args(DynamicsName))
             raise ValueError(f"dynamics is {self.dynamics!r}; it is one of {allowed}")
         for name in _SWITCHES:
             switch = getattr(self, name)

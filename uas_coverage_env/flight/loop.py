@@ -33,7 +33,8 @@ from uas_coverage_env.mission.relaunch import Relaunch
 from uas_coverage_env.plugins.installed import version_of
 from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.simulation import Dynamics, World
+from uas_coverage_env.simulation import World
+from uas_coverage_env.simulation.world import DynamicsName
 from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 from uas_coverage_env.world.packs import swaps_alone
@@ -69,7 +70,7 @@ def rollout(
     planner: Planner | str,
     seed: int = 0,
     *,
-    dynamics: Dynamics = "lpv",
+    dynamics: DynamicsName = "lpv",
     return_mode: bool | None = None,
     safety_filter: bool | None = None,
     max_steps: int | None = None,

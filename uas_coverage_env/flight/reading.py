@@ -44,7 +44,7 @@ from uas_coverage_env.flight.record import (
     Why,
 )
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.simulation.world import DynamicsName
 from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
 
 Count = Annotated[int, Field(ge=0)]
@@ -124,7 +124,7 @@ class _Swap(StrictModel):
 
 
 class _Run(StrictModel):
-    dynamics: Dynamics
+    dynamics: DynamicsName
     return_mode: bool
     safety_filter: bool
     disturbances: tuple[str, ...] = ()

@@ -10,7 +10,7 @@ from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
 from uas_coverage_env.leaderboard.planner_specs import PlannerSpec
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.simulation.world import DynamicsName
 
 PACKAGE = "uas-coverage-env"
 
@@ -34,7 +34,7 @@ class Entry:
     scenario: Scenario
     spec: PlannerSpec
     seed: int
-    dynamics: Dynamics
+    dynamics: DynamicsName
     safety_filter: bool
 
 
@@ -53,7 +53,7 @@ class Sweep:
     scenarios: Mapping[str, Scenario]
     planners: Mapping[str, PlannerSpec]
     seeds: range
-    dynamics: Dynamics = "lpv"
+    dynamics: DynamicsName = "lpv"
     safety_filter: bool = False
 
     @property

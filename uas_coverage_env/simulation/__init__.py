@@ -1,5 +1,5 @@
 """The one compiled step, and a mission that is flown with it."""
 
-from uas_coverage_env.simulation.world import Dynamics, World
+from uas_coverage_env.simulation.world import World
 
-__all__ = ["Dynamics", "World"]
+__all__ = ["World"]

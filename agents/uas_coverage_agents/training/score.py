@@ -72,7 +72,7 @@ def measured(flight: Flight) -> tuple[float, ...]:
     )
 
 
-def score(results: NDArray[np.float64], scenarios: str) -> Score:
+def score_of(results: NDArray[np.float64], scenarios: str) -> Score:
     """The means of `fly` with their 95 % bootstrap intervals.
 
     Args:

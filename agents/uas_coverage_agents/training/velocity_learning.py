@@ -46,7 +46,7 @@ from uas_coverage_agents.route.velocity_runner import RouteVelocityRunner, veloc
 from uas_coverage_agents.training import curve
 from uas_coverage_agents.training.checkpoint import CurvePoint
 from uas_coverage_agents.training.scenarios import town, validation_scenarios
-from uas_coverage_agents.training.score import MEASURES, fly, score
+from uas_coverage_agents.training.score import MEASURES, fly, score_of
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.guidance import velocity_of
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
@@ -54,7 +54,7 @@ from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
 from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.scenario import Scenario, with_disturbances
-from uas_coverage_env.scenario.levels import LEVELS
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 
 CURVE_MISSIONS, SCORE_MISSIONS = 6, 40
 _RETREATS = [
@@ -333,7 +333,7 @@ def train(training: VelocityTraining, directory: Path, missions: int) -> None:
         curve.write(points, directory)
         print(f"round {number + 1} of {training.settings.rounds}: {points[-1]}", flush=True)
     policy = training.policy()
-    scored = score(fly(policy, unseen[:missions]), "generated, validation")
+    scored = score_of(fly(policy, unseen[:missions]), "generated, validation")
     described = policy.description.model_copy(update={"score": scored})
     save_policy(directory / "policy", described, policy.tensors)
 
@@ -345,7 +345,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--missions", type=int, default=SCORE_MISSIONS, help="it is scored on")
     parser.add_argument(
-        "--levels", nargs="*", default=[], choices=list(LEVELS), help="of wind, beside still air"
+        "--levels",
+        nargs="*",
+        default=[],
+        choices=list(DISTURBANCE_LEVELS),
+        help="of wind, beside still air",
     )
     asked = parser.parse_args(argv)
     settings = DaggerSettings(levels=tuple(asked.levels))

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
 from uas_coverage_baselines.milp_mpc.getaway import getaway_margin_m
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
-    seconds_home,
     seconds_onward,
+    straight_seconds_home,
 )
 from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
@@ -80,8 +80,8 @@ class ProblemBuilder:
         """Flight time home, with a detour and the landing, see `BatteryReserve`."""
         way = self._way_home(name, self.way(name, HOME, position_m))
         if way is None:
-            return seconds_home(self._vehicles[name], self.home_m[name] - position_m)
-        return seconds_home(self._vehicles[name], way.corner_m - position_m) + way.onward_s
+            return straight_seconds_home(self._vehicles[name], self.home_m[name] - position_m)
+        return straight_seconds_home(self._vehicles[name], way.corner_m - position_m) + way.onward_s
 
     def way(
         self, name: str, target: int, position_m: FloatArray, speed_mps: float = 0.0

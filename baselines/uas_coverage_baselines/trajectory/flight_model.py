@@ -2,7 +2,7 @@
 
 Of the 14 states of the LPV model the program takes 10: of each horizontal axis position, velocity,
 tilt and rate, positive along the axis; then down and its rate. The heading is held by the inner
-loop, and the battery follows from the flight (`rollout`).
+loop, and the battery follows from the flight (`fly_inputs`).
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def reduced_state(x: FloatArray) -> FloatArray:
 
 
 @allocating_kernel
-def rollout(vehicle, start, inputs):
+def fly_inputs(vehicle, start, inputs):
     """Fly inputs of the program in the LPV model, as the world does.
 
     Args:

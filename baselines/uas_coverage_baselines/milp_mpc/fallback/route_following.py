@@ -23,7 +23,7 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.autopilot.guidance import guide
-from uas_coverage_env.autopilot.return_path import flight_home as seconds_home
+from uas_coverage_env.autopilot.return_path import flight_home
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
 from uas_coverage_env.mission import MissionBrief
@@ -147,7 +147,7 @@ class RouteFollower:
         """
         x, most = problem.x0[uas], float(problem.dod_max[uas])
         left_s = (most - float(x[S.DOD])) / dod_per_s(problem.vehicles[uas], most)
-        home_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
+        home_s = sum(flight_home(self._arena, self._row[problem.names[uas]], x))
         return left_s - home_s < _NEXT_STEPS * self._brief.dt_s
 
     def _left_at_home_s(self, problem: PlanningProblem, swarm: SwarmState, uas: int) -> float:
@@ -156,7 +156,7 @@ class RouteFollower:
         most = float(problem.dod_max[uas])
         per_s = dod_per_s(problem.vehicles[uas], most)
         clock_s = (rules.max_steps - swarm.step) * rules.dt_s
-        roughly_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
+        roughly_s = sum(flight_home(self._arena, self._row[problem.names[uas]], x))
         left_s = min((most - float(x[S.DOD])) / per_s, clock_s) - roughly_s
         if left_s > ROUTE_HOME_RESERVE.kept_s:
             return left_s

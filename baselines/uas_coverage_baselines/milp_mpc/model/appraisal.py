@@ -32,7 +32,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
     CornerCutting,
     Coverage,
     Dynamics,
-    Geofence,
+    InsideGeofence,
     MinHeight,
     MovingObstacles,
     Obstacles,
@@ -49,7 +49,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import SolverError
 FloatArray = NDArray[np.float64]
 _MEASURED = frozenset(
     (
-        *(Dynamics, Capabilities, Collision, Geofence, Obstacles, MovingObstacles),
+        *(Dynamics, Capabilities, Collision, InsideGeofence, Obstacles, MovingObstacles),
         *(CornerCutting, Coverage, MinHeight),
     )
 )

@@ -6,7 +6,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks.collision import Collision
 from uas_coverage_baselines.milp_mpc.model.blocks.corner_cutting import CornerCutting
 from uas_coverage_baselines.milp_mpc.model.blocks.coverage import Coverage
 from uas_coverage_baselines.milp_mpc.model.blocks.dynamics import Dynamics
-from uas_coverage_baselines.milp_mpc.model.blocks.geofence import Geofence
+from uas_coverage_baselines.milp_mpc.model.blocks.geofence import InsideGeofence
 from uas_coverage_baselines.milp_mpc.model.blocks.min_height import MinHeight
 from uas_coverage_baselines.milp_mpc.model.blocks.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.milp_mpc.model.blocks.obstacles import Obstacles
@@ -21,7 +21,7 @@ __all__ = [
     "CornerCutting",
     "Coverage",
     "Dynamics",
-    "Geofence",
+    "InsideGeofence",
     "MinHeight",
     "MovingObstacles",
     "Obstacles",

@@ -110,7 +110,7 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
     return result if allowance else result - BRAKING_S
 
 
-def seconds_home(vehicle: VehicleParams, away_m: FloatArray) -> float:
+def straight_seconds_home(vehicle: VehicleParams, away_m: FloatArray) -> float:
     """Flight time home as the reserve takes it [s]; how far on the safe side: docs/range.md.
 
     Args:
