@@ -9,10 +9,11 @@ import pytest
 from added_blocks import Apart, Ceiling, Doubled, Early, Floor, OneLevel, Thrifty, Turned
 from practice_missions import fly, mission
 from toy_problems import TO_OPTIMALITY, flown, planned, state, toy
-from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc import MilpMpc
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
+from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal
 from uas_coverage_baselines.milp_mpc.model.blocks import InsideGeofence, TargetDistance
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, formulate

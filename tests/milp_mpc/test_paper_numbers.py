@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from toy_problems import TO_OPTIMALITY, state, toy
-from uas_coverage_baselines.milp_mpc import PAPER_OCP, MilpMpcPaper, Weights, formulate
-from uas_coverage_baselines.milp_mpc.model.problem import Target
+from uas_coverage_baselines.milp_mpc import PAPER_OCP, MilpMpcPaper, formulate
+from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.scenario import load_scenario

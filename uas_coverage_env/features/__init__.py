@@ -5,7 +5,7 @@ points of the step (`feature.Point`).
 """
 
 from uas_coverage_env.compiled.random import normal, uniform
-from uas_coverage_env.features.event import EventTable, OfUas
+from uas_coverage_env.features.event import OfUas
 from uas_coverage_env.features.feature import Disturbance, Feature, Point
 from uas_coverage_env.features.of_scenario import disturbances_of
 from uas_coverage_env.features.steady_wind import constant_wind
@@ -13,7 +13,6 @@ from uas_coverage_env.features.table import FeatureTable
 
 __all__ = [
     "Disturbance",
-    "EventTable",
     "Feature",
     "FeatureTable",
     "OfUas",

@@ -189,7 +189,7 @@ def _fit(network: nn.Sequential, rows: torch.Tensor, beyond_s: torch.Tensor) -> 
             optimiser.step()
 
 
-def main() -> None:
+def run_script() -> None:
     """Label, learn, save."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("out", type=Path)
@@ -248,4 +248,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script()

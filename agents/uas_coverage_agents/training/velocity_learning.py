@@ -338,7 +338,7 @@ def train(training: VelocityTraining, directory: Path, missions: int) -> None:
     save_policy(directory / "policy", described, policy.tensors)
 
 
-def main(argv: Sequence[str] | None = None) -> None:
+def run_script(argv: Sequence[str] | None = None) -> None:
     """Train, score and save."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("out", type=Path)
@@ -357,4 +357,4 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE, K
 from uas_coverage_agents.waypoint.observation import NO_TARGET
-from uas_coverage_agents.waypoint.scorer import best_choice, score
+from uas_coverage_agents.waypoint.scorer import best_choice, write_scores
 from uas_coverage_agents.waypoint.team import (
     ENERGY,
     LEFT,
@@ -173,7 +173,7 @@ def simulate(
         if n <= change_at or keep_on:
             choice = planned(state.uncovered, plan, at, i, candidates, legal)
         if n == change_at:
-            score(weights, observation, workspace.scores)
+            write_scores(weights, observation, workspace.scores)
             other = _draw(workspace.scores, legal, choice, rng)
             if other >= 0:
                 choice = other

@@ -3,7 +3,7 @@
 from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, PAPER_OCP, Block, formulate
-from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables, Weights
+from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
 from uas_coverage_baselines.milp_mpc.paper_planner import MilpMpcPaper
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc
 
@@ -17,6 +17,5 @@ __all__ = [
     "MilpMpcPaper",
     "PlanningProblem",
     "Variables",
-    "Weights",
     "formulate",
 ]

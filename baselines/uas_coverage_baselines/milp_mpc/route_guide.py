@@ -18,7 +18,8 @@ from uas_coverage_baselines.routing import (
     improve_routes,
 )
 from uas_coverage_baselines.routing.window import RouteWindow
-from uas_coverage_env.mission import Legs, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.planning.reserves import ORDER_GUIDE, ORDER_GUIDE_RESERVE
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState

@@ -27,7 +27,6 @@ KINDS: dict[str, Callable[[Flight], Figure]] = {
 }
 
 __all__ = [
-    "KINDS",
     "battery_figure",
     "decision_time_figure",
     "map_figure",

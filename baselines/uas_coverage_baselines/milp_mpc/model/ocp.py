@@ -26,9 +26,9 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
     Obstacles,
     Slack,
     TargetDistance,
-    TimeToGo,
 )
 from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
+from uas_coverage_baselines.milp_mpc.model.blocks.time_to_go import TimeToGo
 from uas_coverage_baselines.milp_mpc.model.milp import ELIMINATED, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES

@@ -12,7 +12,6 @@ from uas_coverage_baselines.milp_mpc.model.blocks.moving_obstacles import Moving
 from uas_coverage_baselines.milp_mpc.model.blocks.obstacles import Obstacles
 from uas_coverage_baselines.milp_mpc.model.blocks.slack import Slack
 from uas_coverage_baselines.milp_mpc.model.blocks.target_distance import TargetDistance
-from uas_coverage_baselines.milp_mpc.model.blocks.time_to_go import TimeToGo
 
 __all__ = [
     "BatteryReserve",
@@ -27,5 +26,4 @@ __all__ = [
     "Obstacles",
     "Slack",
     "TargetDistance",
-    "TimeToGo",
 ]
