@@ -1,4 +1,4 @@
-"""`uas-coverage demonstrate`: what a planner does on many missions, as data to learn from."""
+"""`uas-coverage planner demonstrate`: what a planner does on many missions, as data to learn from."""
 
 import json
 import sys
@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from rich.progress import track
 
 from uas_coverage_env.cli.compilation import compilation_shown
-from uas_coverage_env.cli.options import LAST_SEED, options_of
+from uas_coverage_env.cli.options import LAST_SEED, typed_options
 from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
@@ -32,7 +32,7 @@ def demonstrate_command(
     ],
     out: Annotated[Path, typer.Option(help="Folder of the missions; resumed if it exists.")],
     planner: Annotated[
-        str, typer.Option(metavar="NAME", help="The planner that demonstrates; see `planners`.")
+        str, typer.Option(metavar="NAME", help="The planner that demonstrates; see `planner list`.")
     ] = "trajectory",
     option: Annotated[
         list[str] | None,
@@ -51,7 +51,7 @@ def demonstrate_command(
     A compressed file of NumPy arrays for each mission; `Demonstrations.load` reads them all
     (docs/imitation.md). Ctrl-C or a kill loses no mission that was flown: the same command goes on.
     """
-    missions, options = scenarios_of(scenarios), options_of(option or ())
+    missions, options = scenarios_of(scenarios), typed_options(option or ())
     load_planner(planner, options)  # what is wrong is refused before anything is flown
     head = {"planner": planner, "options": options, "seed": seed}
     _keep_head(out, head)

@@ -21,7 +21,7 @@ from uas_coverage_env.flight import (
     packs_used,
     summary,
 )
-from uas_coverage_env.flight.interruption import interruptions_noted
+from uas_coverage_env.interruptions import signals_noted
 
 
 def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> bool:
@@ -30,7 +30,7 @@ def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> bool:
     Returns:
         Whether one has come.
     """
-    with interruptions_noted() as interrupted:
+    with signals_noted() as interrupted:
         flight.save(directory, overwrite=overwrite)
         draw_flight(flight, directory / "map.png")
         return interrupted()

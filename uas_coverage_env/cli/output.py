@@ -8,7 +8,7 @@ from rich.console import Console
 if TYPE_CHECKING:
     from uas_coverage_env.scenario import Scenario
 
-DONE, FAILED = 0, 1
+DONE, FAILED, REFUSED = 0, 1, 2
 
 
 def console(*, quiet: bool = False) -> Console:

@@ -15,6 +15,7 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.flight import Flight, sorties_summary
+from uas_coverage_env.interruptions import STOPPED
 
 SUMMARY = "sorties.json"
 _MOST_BYTES = 10_000_000
@@ -44,6 +45,8 @@ def keep_sorties(
         number = path.name.removeprefix("sortie_")
         if number.isdigit() and int(number) > len(flights):
             sys.stderr.write(f"warning: {path}: is of an earlier run\n")
+    if stopped or result["ended"] == "stopped":
+        return STOPPED
     done = result["left"] == 0 and result["all_home"] and not result["violations"]
     return DONE if done else FAILED
 

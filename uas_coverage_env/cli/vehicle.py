@@ -22,19 +22,6 @@ from uas_coverage_env.vehicle import (
 _PROPELLER = re.compile(r"(\d+(?:\.\d+)?)(?:\s*[xX]\s*(\d+(?:\.\d+)?))?")
 _USUAL_PITCH = 0.45  # of the diameter
 
-app = typer.Typer(
-    invoke_without_command=True, help="List the shipped vehicles, check one, or make one."
-)
-
-
-@app.callback()
-def vehicle(context: typer.Context) -> None:
-    """List the shipped vehicles; `check FILE` validates one, `new` makes one."""
-    if context.invoked_subcommand is None:
-        list_vehicles()
-
-
-@app.command("list")
 def list_vehicles() -> None:
     """List the shipped vehicles."""
     table = Table(
@@ -55,7 +42,6 @@ def list_vehicles() -> None:
     console().print(table)
 
 
-@app.command()
 def check(
     file: Annotated[
         str, typer.Argument(metavar="FILE", help="Vehicle file, or the name of a shipped one.")

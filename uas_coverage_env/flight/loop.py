@@ -22,12 +22,12 @@ from uas_coverage_env.features.of_scenario import features_of
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
-from uas_coverage_env.flight.interruption import interruptions_noted
 from uas_coverage_env.flight.left_open import left_open
 from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
+from uas_coverage_env.interruptions import signals_noted
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.relaunch import Relaunch
 from uas_coverage_env.plugins.installed import version_of
@@ -171,7 +171,7 @@ def rollout(
 
     ended = "stopped"
     # the flight up to there is valid
-    with contextlib.suppress(KeyboardInterrupt), interruptions_noted() as interrupted:
+    with contextlib.suppress(KeyboardInterrupt), signals_noted() as interrupted:
 
         def stops() -> bool:
             return interrupted() or (should_stop is not None and should_stop())

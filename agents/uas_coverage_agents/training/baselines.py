@@ -12,7 +12,7 @@ from uas_coverage_agents.training.score import MEASURES, measured
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import load_planner, rollout
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.replay.figures.training import BASELINES
 from uas_coverage_env.scenario import Scenario
 

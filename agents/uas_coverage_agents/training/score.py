@@ -19,7 +19,7 @@ from uas_coverage_env.flight import (
     home,
     rollout,
 )
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.scenario import Scenario
 
 MEASURES = (

@@ -52,7 +52,7 @@ from uas_coverage_env.autopilot.guidance import velocity_of
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.scenario import Scenario, with_disturbances
 from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 
