@@ -53,7 +53,7 @@ _CONTRADICTION = 1e-3
 app = typer.Typer(invoke_without_command=True, add_completion=False)
 console = Console(width=170)
 
-PlannerName = Annotated[str, typer.Option(help="See `uas-coverage planners`.")]
+PlannerName = Annotated[str, typer.Option(help="See `uas-coverage planner list`.")]
 PlannerOption = Annotated[list[str] | None, typer.Option("--option", help="NAME=VALUE.")]
 
 

@@ -127,7 +127,7 @@ def test_ctrl_c_during_the_report_does_not_say_that_nothing_was_kept(
 @pytest.mark.parametrize("when", ["command_group", "_never_stop_at_a_letter"])
 def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
     monkeypatch.setattr(app, when, lambda: signal.raise_signal(signal.SIGINT))
-    assert main(["planners"]) == 1
+    assert main(["planner", "list"]) == 1
     said = capsys.readouterr().err
     assert said == "error: stopped by hand; what was finished before is kept\n"
 
@@ -135,7 +135,7 @@ def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
 def test_an_error_without_an_interruption_is_none_of_these(monkeypatch):
     monkeypatch.setattr(app, "command_group", partial(json.loads, "a mistake of ours"))
     with pytest.raises(json.JSONDecodeError):
-        main(["planners"])
+        main(["planner", "list"])
 
 
 @pytest.mark.usefixtures("python_handles_interrupts")
@@ -147,7 +147,7 @@ def test_an_interruption_that_a_library_turns_into_an_error_is_one_line(monkeypa
             raise TypeError("cannot compare") from interruption
 
     monkeypatch.setattr(app, "command_group", compare)
-    assert main(["planners"]) == 1
+    assert main(["planner", "list"]) == 1
     assert capsys.readouterr().err == "error: stopped by hand (TypeError)\n"
 
 

@@ -118,7 +118,15 @@ def test_missions_survive_their_files_and_damage_is_named(shown, tmp_path):
 
 
 def test_the_command_goes_on_where_it_was_and_keeps_planners_apart(tmp_path, capsys):
-    command = ["demonstrate", "open_field", "--planner", "nearest-waypoint", "--jobs", "1"]
+    command = [
+        "planner",
+        "demonstrate",
+        "open_field",
+        "--planner",
+        "nearest-waypoint",
+        "--jobs",
+        "1",
+    ]
     command += ["--out", str(tmp_path)]
     assert main(command) == 0
     kept = (tmp_path / "open_field.npz").stat().st_mtime_ns

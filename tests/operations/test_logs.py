@@ -69,7 +69,7 @@ def test_an_exported_track_comes_back_as_the_flight_that_it_was(plan, plan_at, t
     arguments = ["--format", "csv", "--out", str(files), "--min-slack", "0", *HERE]
     assert main(["export", plan_at, *arguments]) == 0
     logs = [str(files / f"{name}.csv") for name in plan.names]
-    assert main(["import-log", *logs, "--plan", plan_at, "--out", str(out), *HERE]) == 0
+    assert main(["log", *logs, "--plan", plan_at, "--out", str(out), *HERE]) == 0
     said = capsys.readouterr()
     assert "covered 100%" in said.out
     assert "estimated" not in said.out + said.err
@@ -225,7 +225,7 @@ def test_data_flash_logs_become_a_flight(plan, plan_at, tmp_path, capsys):
         bin_log(path, log.time_s, places, first_s=100.0 + 50.0 * i)
         paths.append(f"{name}={path}")
     out = tmp_path / "flown"
-    assert main(["import-log", *paths, "--plan", plan_at, "--out", str(out), *HERE]) == 0
+    assert main(["log", *paths, "--plan", plan_at, "--out", str(out), *HERE]) == 0
     capsys.readouterr()
     flight = Flight.load(out)
     assert flight.covered[-1] == plan.covered[-1]
@@ -264,7 +264,7 @@ def test_recorded_flights_of_an_autopilot_come_home_and_are_judged(tmp_path, cap
         path.write_text(text)
         logs.append(str(path))
     out = tmp_path / "flown"
-    assert main(["import-log", *logs, "--plan", str(tmp_path / "plan"), "--out", str(out)]) == 0
+    assert main(["log", *logs, "--plan", str(tmp_path / "plan"), "--out", str(out)]) == 0
     capsys.readouterr()
     flight = Flight.load(out)
     for k in (0, 1):
@@ -305,7 +305,7 @@ def test_a_log_that_cannot_be_meant_is_refused_in_one_line(case, plan_at, tmp_pa
     if text is not None:
         path.write_text(text)
     arguments = [str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert said in err
@@ -332,7 +332,7 @@ def test_a_file_that_is_no_log_is_refused_in_one_line(case, plan_at, tmp_path, c
     path.write_text(f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n" * 20 if "csv" not in name else
                     f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n")  # fmt: skip
     arguments = [str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     assert said in capsys.readouterr().err
 
 
@@ -340,5 +340,5 @@ def test_two_logs_of_one_uas_are_refused(plan, plan_at, tmp_path, capsys):
     path = tmp_path / "uas_1.csv"
     path.write_text(f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n")
     arguments = [str(path), str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     assert "is a second log of uas_1" in capsys.readouterr().err

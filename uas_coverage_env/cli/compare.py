@@ -64,7 +64,8 @@ def compare(
         list[str],
         typer.Option(
             metavar="NAME,...",
-            help="Names (see `planner list`) or MODULE:CLASS; LABEL=NAME adds one with other options.",
+            help="Names (see `planner list`) or MODULE:CLASS; LABEL=NAME adds one with other "
+            "options.",
         ),
     ],
     out: Annotated[Path, typer.Option(help="Directory of the sweep; resumed if it exists.")],

@@ -1,4 +1,4 @@
-"""`uas-coverage planner demonstrate`: what a planner does on many missions, as data to learn from."""
+"""`uas-coverage planner demonstrate`: what a planner does, as data to learn from."""
 
 import json
 import sys

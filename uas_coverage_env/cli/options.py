@@ -1,6 +1,7 @@
 """Options that several commands have, and commands whose options are the fields of a record."""
 
 import inspect
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_type_hints
@@ -11,7 +12,7 @@ from uas_coverage_env.cli import completion
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.simulation.world import DynamicsName
 
-Asked = TypeVar("Asked")
+Asked, Made = TypeVar("Asked"), TypeVar("Made")
 
 LAST_SEED = 2**64 - 1
 """The largest seed of a flight."""
@@ -42,6 +43,9 @@ DynamicsOption = Annotated[
 ]
 FilterOption = Annotated[bool, typer.Option("--filter", help="Switch the safety filter on.")]
 FlightDirectory = Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")]
+SecondFlight = Annotated[
+    Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")
+]
 ReplaceFlightOption = Annotated[
     bool, typer.Option("--overwrite", help="Replace the flight in --out.")
 ]
@@ -69,6 +73,19 @@ def declared(command: Callable[[Asked], None]) -> Callable[..., None]:
     run.__annotations__ = get_type_hints(record, include_extras=True)
     setattr(run, "__signature__", inspect.signature(record))  # noqa: B010
     return run
+
+
+def taken(record: Callable[..., Made], asked: Any, **more: Any) -> Made:
+    """A record from what was asked: the fields of one name; what is None is left to its default.
+
+    Args:
+        record: A dataclass.
+        asked: Another one, of a command.
+        more: Fields that are not taken as they were asked for.
+    """
+    names = inspect.signature(record).parameters.keys() - more.keys()
+    same = {name: value for name, value in vars(asked).items() if name in names}
+    return record(**{name: value for name, value in same.items() if value is not None}, **more)
 
 
 def typed_options(texts: Sequence[str]) -> dict[str, str]:
@@ -101,3 +118,8 @@ def check_new_toml(out: Path, *, overwrite: bool) -> None:
         raise InputError(f"--out {out}: should end in .toml")
     if out.exists() and not overwrite:
         raise InputError(f"{out}: exists; give another --out or add --overwrite")
+
+
+def scenario_name(path: Path) -> str:
+    """A name for the scenario of a file, as the file is called."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", path.stem)[:64] or "area"

@@ -13,7 +13,12 @@ from PIL.PngImagePlugin import PngInfo
 from rich.table import Table
 
 from uas_coverage_env.cli import completion
-from uas_coverage_env.cli.options import ReplaceFileOption, ScenarioArgument, check_new_toml
+from uas_coverage_env.cli.options import (
+    ReplaceFileOption,
+    ScenarioArgument,
+    check_new_toml,
+    scenario_name,
+)
 from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.draw import picture
 from uas_coverage_env.draw.signs import legend
@@ -41,6 +46,7 @@ _SLOWLY_S = 3.0
 _MARK = ("Software", "uas-coverage scenario check")
 _FORMER_MARK = ("Software", "uas-coverage scenarios check")
 
+
 def list_scenarios() -> None:
     """List the shipped scenarios, the families that draw others, and the levels."""
     table = Table("name", "UAS", "waypoints", "obstacles", "moving", "size, m", "steps", box=None)
@@ -55,7 +61,7 @@ def list_scenarios() -> None:
     by_seed = ", ".join(f"{family}:SEED" for family in installed_families())
     out.print(f"by a seed: {by_seed}", markup=False)
     for level, task in LEVELS.items():
-        out.print(f"level {level}: {task.meaning} (uas-coverage score --level {level})", markup=False)
+        out.print(f"level {level}: {task.meaning}", markup=False)
 
 
 def check(
@@ -119,9 +125,10 @@ def new(
     in docs/scenario_keys.md, and `scenario check` validates what becomes of it.
     """
     check_new_toml(out, overwrite=overwrite)
-    mission = load_scenario(scenario).model_copy(update={"name": out.stem[:64]})
+    mission = load_scenario(scenario).model_copy(update={"name": scenario_name(out)})
     mission.to_file(out)
-    console().print(f"scenario in {out}; to see it: uas-coverage scenario check {out}", markup=False)
+    said = f"scenario in {out}; to draw it: uas-coverage scenario check {out}"
+    console().print(said, markup=False)
 
 
 def _closed_off(scenario: Scenario, access: Access) -> Iterator[str]:

@@ -62,7 +62,8 @@ def warm_up(
     what = ", ".join([*names, *(["environments"] if learning else [])])
     console().print(f"{done}: {what}", markup=False)
     if not planner:
-        console().print("other planners: `uas-coverage planner warm-up --planner NAME`", markup=False)
+        others = "other planners: `uas-coverage planner warm-up --planner NAME`"
+        console().print(others, markup=False)
 
 
 def _compile_planner(planner: Planner, scenario: Scenario) -> None:

@@ -94,7 +94,7 @@ class Demonstrations:
 
     @classmethod
     def load(cls, directory: str | Path) -> Self:
-        """Read what `uas-coverage demonstrate` has written; nothing is unpickled.
+        """Read what `uas-coverage planner demonstrate` has written; nothing is unpickled.
 
         Raises:
             InputError: There are none, or a file is damaged; names it.

@@ -63,7 +63,7 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
     """MILP-MPC with a global order as terminal cost.
 
     Args:
-        options: see `uas-coverage planners`.
+        options: see `uas-coverage planner list`.
         blocks: of the OCP; those that the option `blocks` names come after them.
     """
 

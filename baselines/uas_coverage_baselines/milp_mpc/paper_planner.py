@@ -155,7 +155,7 @@ class MilpMpcPaper:
     up, or there is none) the rest of the last plan is flown, and where there is none the UAS hover.
 
     Args:
-        options: see `uas-coverage planners`.
+        options: see `uas-coverage planner list`.
         blocks: of the OCP; those that the option `blocks` names come after them.
     """
 

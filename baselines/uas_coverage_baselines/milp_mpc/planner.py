@@ -24,7 +24,7 @@ class MilpMpc(MovingHorizon[MilpMpcOptions]):
     Gasche et al., Sec. III. The paper's program itself, solved to a gap, is `milp-mpc-paper`.
 
     Args:
-        options: see `uas-coverage planners`.
+        options: see `uas-coverage planner list`.
         blocks: of the OCP; those that the option `blocks` names come after them.
     """
 
