@@ -68,5 +68,5 @@ def test_ctrl_c_while_a_command_is_imported_is_one_line(tmp_path):
     ended = interrupted(
         tmp_path, "uas_coverage_env.cli.planner", [*FORMS["installed"], "planner", "list"]
     )
-    assert ended.returncode == 1
+    assert ended.returncode == 130
     assert ended.stderr == "error: stopped by hand; what was finished before is kept\n"

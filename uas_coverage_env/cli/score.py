@@ -35,7 +35,6 @@ def score_command(
     out: Annotated[Path, typer.Option(help="Folder of the scores; resumed if it exists.")] = Path(
         "scores"
     ),
-    players: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> None:
     """Fly the missions of a level and print the scores (docs/levels.md).
 
@@ -46,9 +45,6 @@ def score_command(
     for name in levels:
         check_choice("--level", name, tuple(LEVELS))
     check_choice("--split", split, _SPLITS)
-    if players is not None:
-        sys.stderr.write("--players is called --planners now\n")
-        planners = players
     names = _named("--planners", planners)
     if missions > len(SPLITS[split]):
         raise InputError(f"--missions {missions}: --split {split} has {len(SPLITS[split])}")
