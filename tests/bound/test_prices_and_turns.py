@@ -11,7 +11,7 @@ from uas_coverage_env import rollout
 from uas_coverage_env.bound.prices import STEPS, WITHIN, Ends, Prices, cheapest, energy_prices
 from uas_coverage_env.bound.program import Cut, least_routes
 from uas_coverage_env.bound.turning import LONGEST, turning_of_fleet
-from uas_coverage_env.flight import energy_Wh
+from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.vehicle import PHI, THETA, VX, VY, load_vehicle
 
 HOME = (20.0, 20.0, -1.0)

@@ -5,7 +5,7 @@ import pytest
 from eventful import WAYPOINTS, after, field, hovering
 
 from uas_coverage_env import World, rollout
-from uas_coverage_env.flight import accomplished, coverage
+from uas_coverage_env.flight.metrics import accomplished, coverage
 from uas_coverage_env.vehicle import DOD, VX, VZ, Z
 from uas_coverage_env.world import GoTo, Velocity
 

@@ -10,8 +10,9 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observer import Observer
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Assistants, Demonstrations, demonstrate, episode_return
+from uas_coverage_env.flight import Assistants, Demonstrations, demonstrate
 from uas_coverage_env.flight.demonstrations import UNKNOWN_CHOICE, written
+from uas_coverage_env.flight.metrics import episode_return
 
 SCENARIO = load_scenario("open_field")
 

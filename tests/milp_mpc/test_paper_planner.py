@@ -17,7 +17,8 @@ from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Flight, accomplished, load_planner, rollout
+from uas_coverage_env.flight import Flight, load_planner, rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import VX, VY, return_threshold

@@ -10,7 +10,8 @@ from drawn_lines import lines
 from matplotlib.patches import Rectangle
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, DecisionRecord
+from uas_coverage_env.flight import MODES
+from uas_coverage_env.flight.record import DecisionRecord
 from uas_coverage_env.replay.figures import (
     KINDS,
     WIDTH_IN,

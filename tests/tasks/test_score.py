@@ -8,7 +8,7 @@ import pytest
 
 from uas_coverage_env import InputError
 from uas_coverage_env.cli import main
-from uas_coverage_env.flight import Episode
+from uas_coverage_env.flight.evaluation import Episode
 from uas_coverage_env.tasks import LEVELS, anchors_of, level_named, mission_value, score, seeds_of
 from uas_coverage_env.tasks import scoring as module
 from uas_coverage_env.tasks.scoring import MissionScore, available_Wh, scored

@@ -18,7 +18,7 @@ from uas_coverage_env.autopilot.belief import wind_growth
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import fly_kinematically
 from uas_coverage_env.entities.commands import VELOCITY, WRENCH
-from uas_coverage_env.flight import accomplished, energy_Wh
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh
 from uas_coverage_env.mission import (
     MEAN_HEIGHT_M,
     LearntWind,

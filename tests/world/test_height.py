@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.flight import rollout, summary
+from uas_coverage_env.flight import rollout
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario, warnings

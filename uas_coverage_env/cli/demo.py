@@ -13,7 +13,8 @@ from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.run import free_directory
-from uas_coverage_env.flight import check_directory, load_planner, rollout
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.directory import check_directory
 from uas_coverage_env.replay import write_replay
 from uas_coverage_env.replay.recorded import write_recorded_page
 

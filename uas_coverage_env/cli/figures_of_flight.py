@@ -4,17 +4,16 @@ from collections import Counter
 from typing import Any
 
 from uas_coverage_env.files.digits import three_digits
-from uas_coverage_env.flight import (
-    MODES,
-    Flight,
-    LeftOpen,
+from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.metrics import (
     accomplished,
     energy_Wh,
     fallback_reasons,
     filtered_share,
     packs_used,
-    summary,
 )
+from uas_coverage_env.flight.record import LeftOpen
 
 ENDED = {"complete": "", "steps": "limit of steps reached", "stopped": "stopped"}
 """What ended a flight before the mission did."""

@@ -12,16 +12,16 @@ from uas_coverage_env.cli.figures_of_flight import (
     left_open,
     verdict,
 )
-from uas_coverage_env.flight import (
-    Flight,
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.interruption import interruptions_noted
+from uas_coverage_env.flight.metrics import (
     accomplished,
-    draw_flight,
     fallback_reasons,
     filtered_share,
     packs_used,
-    summary,
 )
-from uas_coverage_env.flight.interruption import interruptions_noted
+from uas_coverage_env.flight.picture import draw_flight
 
 
 def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> bool:

@@ -13,7 +13,8 @@ from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.operations import asked_place, extra
 from uas_coverage_env.cli.output import console, one_line
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import Flight, check_directory
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.directory import check_directory
 
 if TYPE_CHECKING:
     from uas_coverage_env.operations.logs import Logged

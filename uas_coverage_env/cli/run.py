@@ -20,15 +20,9 @@ from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.settings import from_settings
 from uas_coverage_env.cli.sorties import SUMMARY, keep_sorties
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import (
-    Flight,
-    PlannerError,
-    accomplished,
-    check_directory,
-    fly_sorties,
-    load_planner,
-    rollout,
-)
+from uas_coverage_env.flight import Flight, PlannerError, fly_sorties, load_planner, rollout
+from uas_coverage_env.flight.directory import check_directory
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
 

@@ -22,7 +22,8 @@ from uas_coverage_env.cli.figures_of_flight import (
     verdict,
 )
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.flight import Flight, accomplished
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.metrics import accomplished
 
 
 def show(

@@ -16,7 +16,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.hardware import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
-from uas_coverage_env.leaderboard.row import ADDED, COLUMNS, FAILED, FORMER, Row
+from uas_coverage_env.leaderboard.row import COLUMNS, FAILED, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
 from uas_coverage_env.leaderboard.table import (
     effort_cells,
@@ -117,10 +117,6 @@ def published(directory: Path) -> tuple[list[Row], str]:
     except (OSError, polars.exceptions.PolarsError) as error:
         raise InputError(f"{flights}: cannot be read ({error})") from error
     schema = _schema()
-    frame = frame.rename({old: new for new, old in FORMER.items()}, strict=False)
-    frame = frame.with_columns(
-        polars.lit(None, schema[name]).alias(name) for name in ADDED if name not in frame.columns
-    )
     if dict(frame.schema) != schema:
         raise InputError(f"{flights}: has other columns than this version writes; compare again")
     try:

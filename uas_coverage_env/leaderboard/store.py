@@ -15,12 +15,12 @@ from typing import Any, Self
 
 from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard.row import ADDED, COLUMNS, FORMER, Row
+from uas_coverage_env.leaderboard.row import COLUMNS, Row
 from uas_coverage_env.leaderboard.sweep import difference
 
 STORE = "flights.sqlite"
 _LOCK = ".lock"
-_SCHEMA_VERSION = 2
+_SCHEMA_VERSION = 3
 _SQL_TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
 
 
@@ -56,8 +56,7 @@ class Store:
 
     def rows(self) -> list[Row]:
         """All flights, in an order that does not depend on when they were flown."""
-        there = _there(self._connection)
-        columns = ", ".join(_as_stored(name, there) for name in COLUMNS)
+        columns = ", ".join(COLUMNS)
         found = self._connection.execute(
             f"SELECT {columns} FROM flights ORDER BY scenario, label, seed, key"
         )
@@ -195,13 +194,6 @@ def _connection(path: Path) -> sqlite3.Connection:
                 connection.execute(f"PRAGMA user_version = {_SCHEMA_VERSION}")
         elif version != _SCHEMA_VERSION:
             raise sqlite3.DatabaseError(f"its schema is {version}, this is {_SCHEMA_VERSION}")
-        there = _there(connection)
-        for name, former in FORMER.items():
-            if former in there:
-                connection.execute(f"ALTER TABLE flights RENAME COLUMN {former} TO {name}")
-        for name in ADDED:
-            if name not in there:
-                connection.execute(f"ALTER TABLE flights ADD COLUMN {_column(name)}")
         (verdict,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
         if verdict != "ok":
             raise sqlite3.DatabaseError(" ".join(verdict.split()))
@@ -217,18 +209,6 @@ def _column(name: str) -> str:
     kind, *optional = COLUMNS[name]
     key = " PRIMARY KEY" if name == "key" else ""
     return f"{name} {_SQL_TYPES[kind]}{'' if optional else ' NOT NULL'}{key}"
-
-
-def _there(connection: sqlite3.Connection) -> set[str]:
-    """The columns that a store has, of this version or an older one."""
-    return {name for _, name, *_ in connection.execute("PRAGMA table_info(flights)")}
-
-
-def _as_stored(name: str, there: set[str]) -> str:
-    """A column of ours in a query."""
-    if FORMER.get(name) in there:
-        return f"{FORMER[name]} AS {name}"
-    return name if name in there or name not in ADDED else "NULL"
 
 
 def _remove(path: Path) -> None:

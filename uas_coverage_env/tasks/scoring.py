@@ -27,9 +27,9 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.flight import Episode, Planner, Policy, as_planner, evaluate
+from uas_coverage_env.flight import Planner, as_planner, evaluate
+from uas_coverage_env.flight.policy import Policy
 from uas_coverage_env.leaderboard.statistics import Estimate, estimate
-from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.tasks.levels import level_named
 from uas_coverage_env.tasks.task import Task, seeds_of
 
@@ -103,21 +103,10 @@ class Score:
         return float(np.mean([getattr(mission, measure) for mission in self.missions]))
 
 
-def mission_value(episode: Episode, scenario: Scenario) -> tuple[float, float]:
-    """The value of a mission, and its share of energy, see above."""
-    share = episode.energy_Wh / available_Wh(scenario)
-    at_home = episode.home / episode.n_uas
-    return episode.coverage * at_home * (1.0 - 0.5 * min(share, 1.0)), share
-
-
-def available_Wh(scenario: Scenario) -> float:
-    """What all batteries may give: charge above what must be left, at the mean voltage [Wh]."""
-    total_Wh = 0.0
-    for uas, vehicle in zip(scenario.uas, scenario.vehicles, strict=True):
-        battery = vehicle.battery
-        usable = uas.soc_0 - (1.0 - uas.dod_max)
-        total_Wh += usable * battery.capacity_Ah * float(np.mean(battery.ocv_V))
-    return total_Wh
+def mission_value(mission: Any) -> float:
+    """The value of a mission, see above, of anything that has its figures: an episode, a row."""
+    at_home = mission.home / mission.n_uas
+    return mission.coverage * at_home * (1.0 - 0.5 * min(mission.energy_share or 0.0, 1.0))
 
 
 def anchors_of(level: str) -> Anchors | None:
@@ -218,13 +207,12 @@ def _flown(
         space.seed(seed)
         flies = as_planner(lambda seen: space.sample(), **settings)
     (episode,) = evaluate(flies, scenario, seeds=[seed], swarm_of=swarm_of, **settings).episodes
-    value, energy_share = mission_value(episode, scenario)
     return MissionScore(
         seed=seed,
-        value=value,
+        value=mission_value(episode),
         episode_return=episode.episode_return,
         coverage=episode.coverage,
-        energy_share=energy_share,
+        energy_share=episode.energy_share,
         lost=episode.lost,
         home=episode.home,
         n_uas=episode.n_uas,

@@ -8,17 +8,15 @@ from scipy.stats import bootstrap
 
 from uas_coverage_agents.policy import Interval, Policy, Score
 from uas_coverage_agents.policy.planner import runner_of
-from uas_coverage_env.flight import (
-    Assistants,
-    Flight,
+from uas_coverage_env.flight import Assistants, Flight, rollout
+from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.metrics import (
     coverage,
     energy_Wh,
     episode_return,
     filtered_share,
     home,
-    rollout,
 )
-from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.scenario import Scenario
 
 MEASURES = (
