@@ -18,7 +18,7 @@ def row(scenario="a", label="p", seed=0, **changes) -> Row:
         "safety_filter": False,
         "status": FLOWN,
         "reason": None,
-        "check": None,
+        "verdict": None,
         "failed_figures": None,
         "accomplished": True,
         "coverage": 1.0,

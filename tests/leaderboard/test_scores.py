@@ -21,10 +21,9 @@ from uas_coverage_env.leaderboard import (
 )
 from uas_coverage_env.leaderboard.table import (
     NOTHING,
-    effort_cells,
+    cells,
     markdown,
     notes,
-    outcome_cells,
     scenarios_cells,
 )
 
@@ -108,9 +107,9 @@ def test_a_reference_that_has_not_flown_yet_leaves_the_comparison_empty():
 
 def test_cells_say_nothing_where_there_is_nothing_to_say():
     rows = [failed_row("a", "p"), row("a", "q|r", violations=1, accomplished=False)]
-    headings, cells = outcome_cells(scores_of(rows, "p"))
-    text = markdown((headings, cells))
-    assert all(len(line) == len(headings) for line in cells)
+    headings, lines = cells(scores_of(rows, "p"), "outcome")
+    text = markdown((headings, lines))
+    assert all(len(line) == len(headings) for line in lines)
     assert "nan" not in text
     assert r"q\|r" in text
     assert scenarios_cells(rows, ["p", "q|r", "s"])[1] == [["a", "failed", "violation", NOTHING]]
@@ -123,8 +122,8 @@ def test_energy_is_compared_with_the_bound_where_there_is_one():
     assert scores["p"].above_bound_percent.value == pytest.approx(35.0)
     assert scores["p"].above_bound_percent.n == 2
     assert scores["q"].above_bound_percent.value is None
-    headings, cells = effort_cells(list(scores.values()))
-    assert cells[0][headings.index("above the bound, %")].startswith("35.0")
+    headings, lines = cells(list(scores.values()), "effort")
+    assert lines[0][headings.index("above the bound, %")].startswith("35.0")
 
 
 def test_accomplished_lpv_flights_have_a_bound():
@@ -250,8 +249,8 @@ def test_the_return_is_that_of_all_flights_there_are_and_says_of_how_many():
     one = by_label(rows, "p")["p"]
     assert (one.episode_return.value, one.episode_return.n) == (20.0, 2)
     assert one.flat()["episode_return_high"] == 30.0
-    headings, (cells,) = outcome_cells([one])
-    assert cells[headings.index("return")] == "20.0 [10.0, 30.0]"
+    headings, (line,) = cells([one], "outcome")
+    assert line[headings.index("return")] == "20.0 [10.0, 30.0]"
 
 
 def test_a_comparison_of_a_version_that_called_labels_players_can_still_be_drawn(tmp_path):

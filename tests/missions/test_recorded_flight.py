@@ -11,10 +11,10 @@ from importlib import import_module
 from pathlib import Path
 from zipfile import ZipFile
 
-import independent_check
 import numpy as np
 import pytest
 
+from uas_coverage_env import independent_check
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.flight.metrics import accomplished

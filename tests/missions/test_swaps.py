@@ -3,14 +3,13 @@
 import json
 from functools import partial
 
-import independent_check
 import numpy as np
 import pytest
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
 
-from uas_coverage_env import Flight, generate_scenario, load_scenario, rollout
+from uas_coverage_env import Flight, generate_scenario, independent_check, load_scenario, rollout
 from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError

@@ -15,7 +15,7 @@ from uas_coverage_env.simulation import World
 from uas_coverage_env.world import GoTo, Velocity
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-import independent_check
+from uas_coverage_env import independent_check
 
 HOUSE = box("house", (60.0, 60.0, -9.0), (90.0, 90.0, 0.0), 1.0)
 

@@ -299,10 +299,10 @@ def _report(screen: Console, comparison: Comparison, out: Path, names: Sequence[
     wide = Console(width=max(screen.width, _NARROWEST_TABLE), highlight=False)
     for line in comparison.circumstances():
         screen.print(line, markup=False)
-    wide.print(tables.rich_table(tables.outcome_cells(scores), "\nOutcome"))
-    wide.print(tables.rich_table(tables.effort_cells(scores), "\nEffort"))
+    for name in ("outcome", "effort"):
+        wide.print(tables.rich_table(tables.cells(scores, name), f"\n{name.capitalize()}"))
     if len(scores) > 1 and reference in {one.label for one in scores}:
-        cells = tables.reference_cells(scores, reference)
+        cells = tables.cells(scores, "reference", reference)
         wide.print(tables.rich_table(cells, f"\nAgainst {reference}"))
     for line in tables.notes(rows, reference):
         screen.print(f"\n{line}", markup=False)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.flight.figures import NOTHING, Figure, computed, figures, rows_part
+from uas_coverage_env.flight.figures import NOTHING, ByName, Figure, computed, figures, rows_part
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.interruption import unless_stopped
 from uas_coverage_env.flight.loop import rollout
@@ -18,7 +18,7 @@ from uas_coverage_env.scenario import MissionSource, ScenarioLike
 
 
 @dataclass(frozen=True)
-class Episode:
+class Episode(ByName):
     """One mission, in numbers: `figures` (docs/flight_directory.md) are attributes of it, too.
 
     Attributes:
@@ -41,12 +41,6 @@ class Episode:
         values, failed = computed(flight)
         terms = values["reward_terms"] or {}
         return cls(seed, flight.scenario.name, terms, rows_part(values), failed)
-
-    def __getattr__(self, name: str) -> Any:
-        """A figure."""
-        if name.startswith("_") or name not in self.figures:
-            raise AttributeError(f"an episode has no figure {name!r}")
-        return self.figures[name]
 
 
 @dataclass(frozen=True)

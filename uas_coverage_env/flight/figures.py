@@ -32,8 +32,8 @@ GROUP = "uas_coverage.figures"
 _UNITS = {"m": "m", "Wh": "Wh", "s": "s", "mps": "m/s", "rad": "rad", "share": "%"}
 _SCALES = {"%": 100.0, "ms": 1000.0}
 
-Over = Literal["mean", "total", "median", "least", "most"]
-Counts = Literal["flown", "unharmed", "accomplished"]
+Over = Literal["mean", "average", "total", "median", "least", "most"]
+Counts = Literal["all", "flown", "unharmed", "accomplished"]
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,10 @@ class Figure:
         optional: Whether the file leaves it out where it is None.
         shown: Whether `show` has a line for it.
         absent: What rows hold of a flight without it, and of one that failed.
-        over: How the figures of several flights are summed up; `mean` is the interquartile one.
-        counts: Which flights then count: all flown, `unharmed` ones without a violation, ...
+        over: How the figures of several flights are summed up; `mean` is the interquartile one,
+            `average` the plain one.
+        counts: Which flights then count: all (failed ones, too), those that were flown, `unharmed`
+            ones without a violation, or those that accomplished their mission.
         table: Of `compare`, in which it stands; empty: in its files alone.
         counted: Of a list, whether rows hold its length.
         repeats: Whether a repeatable flight has the same again: what it took to compute has not.
@@ -135,6 +137,18 @@ class Figure:
         if self.printed_unit == "ms":
             return three_digits(self.scale * value)
         return f"{value:.{self.digits}f}"
+
+
+class ByName:
+    """What has `figures`: each is an attribute of it, too."""
+
+    figures: Mapping[str, Any]
+
+    def __getattr__(self, name: str) -> Any:
+        """A figure."""
+        if name.startswith("_") or name == "figures" or name not in self.figures:
+            raise AttributeError(f"{type(self).__name__} has no figure {name!r}")
+        return self.figures[name]
 
 
 class FigureError(ValueError):
@@ -295,7 +309,7 @@ FIGURES = (
            over="total", table="outcome", absent=False),
     Figure("coverage", float, metrics.coverage,
            "share of the waypoints covered, 0 to 1; [events](faults.md) may add and drop some",
-           "covered", "%", 1, absent=0.0, table="outcome"),
+           "covered", "%", 1, absent=0.0, counts="all", table="outcome"),
     Figure("seen_ground", dict, lambda flight: seen_shares(flight) or None,
            "sensor → share of the ground that it has [seen](from_area_to_flight.md#seen-ground); "
            "absent unless a UAS carries a camera",
@@ -399,7 +413,8 @@ FIGURES = (
            optional=True),
     Figure("filtered_share", float, metrics.filtered_share,
            "share of the commands that the safety filter replaced; absent where it is off",
-           "commands filtered", digits=1, optional=True, absent=0.0, table="outcome"),
+           "commands filtered", digits=1, optional=True, absent=0.0, over="average",
+           table="outcome"),
     Figure("mip_gap_p50", float, metrics.mip_gap_p50,
            "median gap of the joint program, relative to what the plan can influence; null where "
            "none was solved", "gap of the joint program", "%", 1, table=""),

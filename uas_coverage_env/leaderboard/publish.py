@@ -18,14 +18,7 @@ from uas_coverage_env.leaderboard.hardware import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
 from uas_coverage_env.leaderboard.row import COLUMNS, FAILED, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
-from uas_coverage_env.leaderboard.table import (
-    effort_cells,
-    markdown,
-    notes,
-    outcome_cells,
-    reference_cells,
-    scenarios_cells,
-)
+from uas_coverage_env.leaderboard.table import cells, markdown, notes, scenarios_cells
 
 FLIGHTS, TABLE, SCORES = "flights.parquet", "table.md", "table.json"
 PICTURE = "coverage-energy.png"
@@ -172,7 +165,7 @@ def _json(comparison: Comparison) -> str:
         "reference": comparison.reference,
         "flights": len(comparison.rows),
         "planned": comparison.planned,
-        "scores": [dataclasses.asdict(one) for one in comparison.scores],
+        "scores": [one.plain() for one in comparison.scores],
     }
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -182,10 +175,9 @@ def _markdown(comparison: Comparison) -> str:
     labels = [one.label for one in comparison.scores]
     command, *circumstances = comparison.circumstances()
     parts = [f"`{command}`\n", *(f"{line}\n" for line in circumstances)]
-    parts.append(markdown(outcome_cells(comparison.scores)))
-    parts.append(markdown(effort_cells(comparison.scores)))
+    parts += [markdown(cells(comparison.scores, table)) for table in ("outcome", "effort")]
     if len(labels) > 1 and reference in labels:
-        parts.append(markdown(reference_cells(comparison.scores, reference)))
+        parts.append(markdown(cells(comparison.scores, "reference", reference)))
     parts += [f"{line}\n" for line in notes(rows, reference)]
     failed = [row for row in rows if row.status == FAILED]
     if failed:

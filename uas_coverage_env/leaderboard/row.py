@@ -18,7 +18,7 @@ FLOWN, FAILED = "flown", "failed"
 _LARGEST = 1e12
 
 AGREES, NOT_JUDGED = "agrees", "not judged"
-"""What `check` begins with where the independent checker does not disagree."""
+"""What `verdict` begins with where the independent checker does not disagree."""
 
 TIMES = (*(name for name, each in figures().items() if not each.repeats), "finished_at")
 """Differ from run to run; everything else of a repeatable flight repeats."""
@@ -41,7 +41,7 @@ class _Flown:
         safety_filter: Whether the filter was on for all UAS.
         status: `flown`, or `failed` where there is no flight.
         reason: Why it failed.
-        check: What the independent checker says: `agrees`, `not judged: ` and why, or in what it
+        verdict: What the independent checker says: `agrees`, `not judged: ` and why, or in what it
             disagrees; None where it was not asked.
         failed_figures: Which figures could not be computed, and why; None: all could.
         trajectory_sha256: Hash of every state of every UAS.
@@ -62,7 +62,7 @@ class _Flown:
     safety_filter: bool
     status: str
     reason: str | None
-    check: str | None
+    verdict: str | None
     failed_figures: str | None
     trajectory_sha256: str | None
     versions: str
@@ -75,14 +75,16 @@ class _Flown:
             """A figure."""
 
     @classmethod
-    def of(cls, entry: Entry, flight: Flight, source_sha256: str, check: str | None = None) -> Self:
-        """The row of a flight that was flown; `check`: what the independent checker says of it."""
+    def of(
+        cls, entry: Entry, flight: Flight, source_sha256: str, verdict: str | None = None
+    ) -> Self:
+        """The row of a flight that was flown, and what the independent checker says of it."""
         values, failed = computed(flight)
         return cls(
             **_identity(entry),
             status=FLOWN,
             reason=None,
-            check=check,
+            verdict=verdict,
             failed_figures="; ".join(failed.values()) or None,
             trajectory_sha256=hashlib.sha256(flight.x.tobytes()).hexdigest(),
             versions=json.dumps(dict(flight.versions), sort_keys=True),
@@ -98,7 +100,7 @@ class _Flown:
             **_identity(entry),
             status=FAILED,
             reason=" ".join(reason.split()),
-            check=None,
+            verdict=None,
             failed_figures=None,
             trajectory_sha256=None,
             versions="{}",
@@ -138,7 +140,7 @@ class _Flown:
     @property
     def disagrees(self) -> bool:
         """Whether the independent checker disagrees with it."""
-        return self.check is not None and not self.check.startswith((AGREES, NOT_JUDGED))
+        return self.verdict is not None and not self.verdict.startswith((AGREES, NOT_JUDGED))
 
 
 if TYPE_CHECKING:
