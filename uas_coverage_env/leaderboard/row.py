@@ -2,24 +2,22 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any, Self, get_args
+from typing import Any, Self
 
 from uas_coverage_env.flight import (
     Flight,
     accomplished,
     episode_return,
     filtered_share,
+    home,
     summary,
 )
+from uas_coverage_env.flight.record import LOST
 from uas_coverage_env.leaderboard.sweep import Entry
 
 FLOWN, FAILED = "flown", "failed"
-
-# of anything that is measured; NaN is not below it
-_LARGEST = 1e12
 
 # differ from run to run; everything else of a repeatable flight repeats
 TIMES = ("decision_p50_s", "decision_p95_s", "wall_time_s", "finished_at")
@@ -33,6 +31,7 @@ class Row:
         key: Hash of all that decides how the flight goes.
         scenario: Name of the scenario.
         scenario_sha256: Hash of the scenario.
+        level: Of which the mission is (`tasks.LEVELS`); empty where of none.
         label: Of the planner with its options.
         planner: Name of the planner.
         options: Its options, as JSON.
@@ -44,6 +43,9 @@ class Row:
         accomplished: All waypoints covered, all UAS home, no contact, no limit exceeded.
         coverage: Fraction of the waypoints; 0 where the flight failed.
         all_home: Whether all UAS have landed.
+        n_uas: UAS of the mission.
+        home: UAS that have landed.
+        lost: UAS that were lost.
         violations: Contacts, and limits exceeded by UAS.
         breaches: Samples closer than the safe distances.
         steps: Steps until the last UAS was home, lost, or the flight ended.
@@ -60,12 +62,13 @@ class Row:
         source_sha256: Hash of the source code that flew it.
         finished_at: When, UTC.
         episode_return: Sum of the rewards of all UAS, as the environments pay by default, not
-            discounted; None where a version flew it that did not keep it.
+            discounted; None where the flight failed.
     """
 
     key: str
     scenario: str
     scenario_sha256: str
+    level: str
     label: str
     planner: str
     options: str
@@ -77,6 +80,9 @@ class Row:
     accomplished: bool
     coverage: float
     all_home: bool
+    n_uas: int
+    home: int
+    lost: int
     violations: int
     breaches: int
     steps: int | None
@@ -92,7 +98,12 @@ class Row:
     versions: str
     source_sha256: str
     finished_at: str
-    episode_return: float | None = None
+    episode_return: float | None
+
+    def __post_init__(self) -> None:
+        """Refuse a status that there is none of."""
+        if self.status not in (FLOWN, FAILED):
+            raise ValueError(f"status of a flight is {self.status[:40]!r}")
 
     @classmethod
     def of(cls, entry: Entry, flight: Flight, source_sha256: str) -> Self:
@@ -105,6 +116,9 @@ class Row:
             accomplished=accomplished(flight),
             coverage=result["coverage"],
             all_home=result["all_home"],
+            n_uas=len(flight.names),
+            home=int(home(flight).sum()),
+            lost=int((flight.mode[-1] == LOST).sum()),
             violations=len(result["violations"]),
             breaches=result["breaches"],
             steps=result["steps"],
@@ -133,6 +147,9 @@ class Row:
             accomplished=False,
             coverage=0.0,
             all_home=False,
+            n_uas=len(entry.scenario.uas),
+            home=0,
+            lost=0,
             violations=0,
             breaches=0,
             steps=None,
@@ -148,30 +165,8 @@ class Row:
             versions="{}",
             source_sha256=source_sha256,
             finished_at=_now(),
+            episode_return=None,
         )
-
-    @classmethod
-    def checked(cls, values: Mapping[str, Any]) -> Self:
-        """The row that a file holds.
-
-        Raises:
-            ValueError: A value is none that we write; names the column.
-        """
-        found = dict(values)
-        for name, kinds in COLUMNS.items():
-            value = found[name]
-            if bool in kinds and value in (0, 1):  # SQLite knows no others
-                value = bool(value)
-            elif float in kinds and type(value) is int:
-                value = float(value)
-            bounded = not isinstance(value, float) or abs(value) <= _LARGEST
-            if type(value) not in kinds or not bounded or (type(value) is int and value < 0):
-                raise ValueError(f"{name} of a flight is {repr(value)[:40]}")
-            found[name] = value
-        row = cls(**found)
-        if row.status not in (FLOWN, FAILED):
-            raise ValueError(f"status of a flight is {row.status[:40]!r}")
-        return row
 
     @property
     def ranked(self) -> bool:
@@ -179,29 +174,18 @@ class Row:
         return self.status == FLOWN and not self.violations
 
 
-COLUMNS: dict[str, tuple[Any, ...]] = {
-    field.name: get_args(field.type) or (field.type,) for field in fields(Row)
-}
-"""What a row holds: name -> the types of its values, None's last."""
-
-ADDED = ("episode_return",)
-"""Columns that older sweeps do not have; there, they are None."""
-
-FORMER = {"label": "player"}
-"""Columns that older sweeps have under another name."""
-
-
 def _identity(entry: Entry) -> dict[str, Any]:
     return {
         "key": entry.key,
         "scenario": entry.scenario.name,
         "scenario_sha256": entry.scenario_sha256,
+        "level": entry.level,
         "label": entry.spec.label,
         "planner": entry.spec.planner,
         "options": json.dumps(dict(entry.spec.options), sort_keys=True),
         "seed": entry.seed,
         "dynamics": entry.dynamics,
-        "safety_filter": entry.safety_filter,
+        "safety_filter": bool(entry.safety_filter),
     }
 
 
