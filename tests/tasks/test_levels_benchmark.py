@@ -4,10 +4,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from uas_coverage_env.tasks.store import ScoreStore
 
 from uas_coverage_env.tasks import scoring, seeds_of
 from uas_coverage_env.tasks.scoring import MissionScore, scored
-from uas_coverage_env.tasks.store import ScoreStore
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
@@ -31,7 +31,5 @@ def test_random_policy_and_best_planner_score_0_and_1_on_the_missions_of_the_anc
 
 
 def mission(seed: int, value: float) -> MissionScore:
-    return MissionScore(
-        seed=seed, value=value, episode_return=1.0, coverage=1.0, energy_share=0.2, lost=0, home=1,
-        n_uas=1, steps=9,
-    )  # fmt: skip
+    figures = {"coverage": 1.0, "energy_share": 0.2, "lost": 0, "home": 1, "n_uas": 1, "steps": 9}
+    return MissionScore(seed, value, {"episode_return": 1.0, **figures})

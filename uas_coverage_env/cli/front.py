@@ -11,30 +11,28 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from uas_coverage_env.cli.compare import bounds_shown, fly_sweep
-from uas_coverage_env.cli.options import LAST_SEED
-from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
+from uas_coverage_env.cli.compare import bounds_shown
+from uas_coverage_env.cli.options import (
+    LAST_KEPT_SEED,
+    BackendOption,
+    JobsOption,
+    OverwriteOption,
+)
+from uas_coverage_env.cli.output import FAILED, console
+from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_others
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.leaderboard import (
-    FLOWN,
-    Row,
-    Sweep,
-    failures,
-    jobs_of,
-    kept_as,
-    opened,
-    scenarios_of,
-    source_of,
-)
+from uas_coverage_env.leaderboard import FLOWN, Row, Sweep, scenarios_of
 from uas_coverage_env.leaderboard import front as fronts
 from uas_coverage_env.leaderboard import table as tables
+from uas_coverage_env.leaderboard.flying import kept_as
+from uas_coverage_env.runner import Workers, opened
 
 _WEIGHTS = "weight_energy=0,0.02,0.05,0.1,0.2,0.4,0.6,1,2,5,20"
 _NARROWEST_TABLE = 100
 _MOVED_M = 1.0  # what flies moves farther
-FLIGHTS, TABLE, PICTURE = "flights", "front.md", "front.png"
+TABLE, PICTURE = "front.md", "front.png"
 
 
 def front(
@@ -58,14 +56,10 @@ def front(
             show_default=False,
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the planner.", min=0, max=LAST_SEED)] = 0,
-    jobs: Annotated[
-        int | None,
-        typer.Option(min=1, help="Flights in parallel; default: one per core.", show_default=False),
-    ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Delete the flights in --out.")
-    ] = False,
+    seed: Annotated[int, typer.Option(help="Of the planner.", min=0, max=LAST_KEPT_SEED)] = 0,
+    backend: BackendOption = "process",
+    jobs: JobsOption = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Fly a planner with different options, and draw time against energy.
 
@@ -80,38 +74,39 @@ def front(
         scenarios_of(scenarios), fronts.varied_specs(planner, asked), range(seed, seed + 1)
     )
     entries, screen = list(sweep.entries()), console()
-    side_by_side = jobs_of(jobs, "process")
-    with opened(out, sweep.description(), overwrite=overwrite) as store:
-        source = source_of(sweep.planners.values())
-        trouble = fly_sweep(entries, store, screen, side_by_side, "process", source, out / FLIGHTS)
+    described = {"command": "front", **sweep.description()}
+    with (
+        Workers(jobs, backend) as workers,
+        opened(out, described, Row, overwrite=overwrite) as store,
+    ):
+        refuse_others(store, entries)
+        trouble = fly_and_keep(entries, store, workers, screen, "flight")
         rows = store.rows()
-    bounds = bounds_shown(rows, sweep.scenarios, screen, side_by_side)
+        bounds = {} if trouble else bounds_shown(rows, sweep.scenarios, screen, workers)
     keys = [text.partition("=")[0].strip() for text in asked]
     found = {}
     for name, scenario in sweep.scenarios.items():
         mine = [row for row in rows if row.scenario == name]
-        flying = _flying(mine, out / FLIGHTS)
+        flying = _flying(mine, out)
         choices = fronts.choices_of(mine, keys, scenario.dt_s, flying, bounds)
         if choices:
             found[name] = choices
-    failed = [row for row in rows if row.status != FLOWN]
-    for line in [*failures(failed), *([trouble] if trouble else [])]:
-        sys.stderr.write(f"error: {one_line(line)}\n")
     if not found:
         sys.stderr.write("error: no flight accomplished its mission\n")
+        end_with(rows, trouble)
         raise typer.Exit(FAILED)
     _write(found, out, _command(scenarios, planner, asked, seed, out))
     _report(screen, found, rows, out)
-    raise typer.Exit(FAILED if failed or trouble else DONE)
+    end_with(rows, trouble)
 
 
-def _flying(rows: Iterable[Row], flights: Path) -> dict[str, int]:
+def _flying(rows: Iterable[Row], out: Path) -> dict[str, int]:
     """Label -> UAS that took off, of the flights that are kept."""
     result = {}
     for row in rows:
         if row.status == FLOWN:
             with contextlib.suppress(InputError):
-                flight = Flight.load(flights / kept_as(row))
+                flight = Flight.load(out / kept_as(row))
                 moved_m = np.abs(flight.x[:, :, :3] - flight.x[0, :, :3]).max(axis=(0, 2))
                 result[row.label] = int((moved_m > _MOVED_M).sum())
     return result

@@ -3,10 +3,10 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import load_planner
+from uas_coverage_env.flight import Planner, load_planner
 from uas_coverage_env.flight.registry import options_of
 
 _LABELLED = re.compile(r"([\w.+-]+)=(.+)", re.DOTALL)
@@ -30,6 +30,22 @@ class PlannerSpec:
     fingerprint: str
     package: str
 
+    @classmethod
+    def named(cls, label: str, planner: str, options: Mapping[str, str] | None = None) -> Self:
+        """A planner by its name, with the options that are given and the defaults of the others.
+
+        Raises:
+            InputError: An unknown planner or option.
+        """
+        made = load_planner(planner, options)
+        return cls(
+            label,
+            planner,
+            options_of(made),
+            fingerprint=getattr(made, "fingerprint", ""),
+            package=type(made).__module__.partition(".")[0],
+        )
+
     def identity(self) -> dict[str, Any]:
         """What its flights depend on; where a policy's folder lies does not matter."""
         kind, _, argument = self.planner.partition(":")
@@ -39,6 +55,17 @@ class PlannerSpec:
             "options": dict(self.options),
             "fingerprint": self.fingerprint,
         }
+
+    def load(self) -> Planner:
+        """Make the planner.
+
+        Raises:
+            InputError: It cannot be made, or flies by other data by now.
+        """
+        planner = load_planner(self.planner, self.options)
+        if getattr(planner, "fingerprint", "") != self.fingerprint:
+            raise InputError(f"{self.label}: its files have changed since the sweep has begun")
+        return planner
 
 
 def planner_specs_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, PlannerSpec]:
@@ -72,19 +99,9 @@ def planner_specs_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, 
             raise InputError(f"--option {label}:{key} is given twice; give it once")
         given[label][key] = value
     return {
-        label: _planner_spec(label, planner, given[label]) for label, planner in planners.items()
+        label: PlannerSpec.named(label, planner, given[label])
+        for label, planner in planners.items()
     }
-
-
-def _planner_spec(label: str, name: str, options: Mapping[str, str]) -> PlannerSpec:
-    planner = load_planner(name, options)
-    return PlannerSpec(
-        label,
-        name,
-        options_of(planner),
-        fingerprint=getattr(planner, "fingerprint", ""),
-        package=type(planner).__module__.partition(".")[0],
-    )
 
 
 def _option(text: str, labels: Sequence[str]) -> tuple[str, str, str]:

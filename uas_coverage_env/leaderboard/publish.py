@@ -1,4 +1,4 @@
-"""The files of a comparison: flights as parquet, scores as CSV, JSON and Markdown, a picture."""
+"""The files of a comparison: flights in the store, scores as CSV, JSON and Markdown, a picture."""
 
 import csv
 import dataclasses
@@ -16,9 +16,11 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.hardware import machine, versions
 from uas_coverage_env.leaderboard.picture import picture
-from uas_coverage_env.leaderboard.row import COLUMNS, FAILED, Row
+from uas_coverage_env.leaderboard.row import FAILED, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
 from uas_coverage_env.leaderboard.table import cells, markdown, notes, scenarios_cells
+from uas_coverage_env.runner import STORE, rows_in
+from uas_coverage_env.runner.store import columns_of
 
 FLIGHTS, TABLE, SCORES = "flights.parquet", "table.md", "table.json"
 PICTURE = "coverage-energy.png"
@@ -85,7 +87,6 @@ def write(comparison: Comparison, directory: Path) -> list[str]:
         InputError: One cannot be written.
     """
     files = {
-        FLIGHTS: _parquet(comparison.rows),
         "table.csv": _csv(comparison.scores).encode(),
         SCORES: _json(comparison).encode(),
         TABLE: _markdown(comparison).encode(),
@@ -102,49 +103,37 @@ def published(directory: Path) -> tuple[list[Row], str]:
     Raises:
         InputError: A file is missing, or is none that this version writes.
     """
-    import polars
-
-    flights, table = directory / FLIGHTS, directory / SCORES
-    try:
-        frame = polars.read_parquet(read_bytes(flights))
-    except (OSError, polars.exceptions.PolarsError) as error:
-        raise InputError(f"{flights}: cannot be read ({error})") from error
-    schema = _schema()
-    if dict(frame.schema) != schema:
-        raise InputError(f"{flights}: has other columns than this version writes; compare again")
+    table = directory / SCORES
+    rows = rows_in(directory, Row)
     try:
         reference = json.loads(read_bytes(table))["reference"]
     except (OSError, ValueError, RecursionError, KeyError, TypeError) as error:
         raise InputError(f"{table}: cannot be read, or names no reference ({error})") from error
-    try:
-        rows = [Row.checked(row) for row in frame.iter_rows(named=True)]
-    except ValueError as error:
-        raise InputError(f"{flights}: was damaged ({error}); compare again") from error
     if not rows:
-        raise InputError(f"{flights}: holds no flight")
+        raise InputError(f"{directory / STORE}: holds no flight")
     if not isinstance(reference, str) or reference not in {row.label for row in rows}:
-        raise InputError(f"{table}: the reference {reference!r} has no flight in {flights.name}")
+        raise InputError(f"{table}: the reference {reference!r} has no flight in {STORE}")
     return rows, reference
 
 
-def _schema() -> dict[str, Any]:
-    import polars  # 50 MB of code that only this needs
+def parquet(rows: Sequence[Row]) -> bytes:
+    """Flights as a parquet file, a column for each field of `Row`.
 
-    kinds = {
-        str: polars.String,
-        int: polars.Int64,
-        bool: polars.Boolean,
-        float: polars.Float64,
-    }
-    return {name: kinds[kind] for name, (kind, *_) in COLUMNS.items()}
-
-
-def _parquet(rows: Sequence[Row]) -> bytes:
-    import polars
-
+    Raises:
+        InputError: polars (extra `parquet`) is not installed.
+    """
+    try:
+        import polars
+    except ImportError as error:
+        raise InputError(
+            f"--parquet: polars cannot be loaded ({error}); "
+            "python -m pip install 'uas-coverage-env[parquet]'"
+        ) from error
+    kinds = {str: polars.String, int: polars.Int64, bool: polars.Boolean, float: polars.Float64}
+    schema = {name: kinds[kind] for name, (kind, *_) in columns_of(Row).items()}
     values = [dataclasses.astuple(row) for row in rows]
     file = io.BytesIO()
-    polars.DataFrame(values, _schema(), orient="row").write_parquet(file)
+    polars.DataFrame(values, schema, orient="row").write_parquet(file)
     return file.getvalue()
 
 

@@ -3,19 +3,15 @@
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, Self, get_args
+from typing import TYPE_CHECKING, Any, Self
 
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.figures import computed, figures, rows_part
 from uas_coverage_env.leaderboard.sweep import Entry
 
 FLOWN, FAILED = "flown", "failed"
-
-# of anything that is measured; NaN is not below it
-_LARGEST = 1e12
 
 AGREES, NOT_JUDGED = "agrees", "not judged"
 """What `verdict` begins with where the independent checker does not disagree."""
@@ -74,6 +70,11 @@ class _Flown:
         def __getattr__(self, figure: str) -> Any:
             """A figure."""
 
+    def __post_init__(self) -> None:
+        """Refuse a status that there is none of."""
+        if self.status not in (FLOWN, FAILED):
+            raise ValueError(f"status of a flight is {self.status[:40]!r}")
+
     @classmethod
     def of(
         cls, entry: Entry, flight: Flight, source_sha256: str, verdict: str | None = None
@@ -106,31 +107,8 @@ class _Flown:
             versions="{}",
             source_sha256=source_sha256,
             finished_at=_now(),
-            **rows_part(None),
+            **{**rows_part(None), "n_uas": len(entry.scenario.uas)},
         )
-
-    @classmethod
-    def checked(cls, values: Mapping[str, Any]) -> Self:
-        """The row that a file holds.
-
-        Raises:
-            ValueError: A value is none that we write; names the column.
-        """
-        found = dict(values)
-        for name, kinds in COLUMNS.items():
-            value = found[name]
-            if bool in kinds and value in (0, 1):  # SQLite knows no others
-                value = bool(value)
-            elif float in kinds and type(value) is int:
-                value = float(value)
-            bounded = not isinstance(value, float) or abs(value) <= _LARGEST
-            if type(value) not in kinds or not bounded or (type(value) is int and value < 0):
-                raise ValueError(f"{name} of a flight is {repr(value)[:40]}")
-            found[name] = value
-        row = cls(**found)
-        if row.status not in (FLOWN, FAILED):
-            raise ValueError(f"status of a flight is {row.status[:40]!r}")
-        return row
 
     @property
     def ranked(self) -> bool:
@@ -159,18 +137,12 @@ else:
     )
 
 
-COLUMNS: dict[str, tuple[Any, ...]] = {
-    each.name: get_args(each.type) or (each.type,) for each in dataclasses.fields(Row)
-}
-"""What a row holds: name -> the types of its values, None's last."""
-
-
 def _identity(entry: Entry) -> dict[str, Any]:
     return {
         "key": entry.key,
         "scenario": entry.scenario.name,
         "scenario_sha256": entry.scenario_sha256,
-        "level": getattr(entry, "level", ""),
+        "level": entry.level,
         "label": entry.spec.label,
         "planner": entry.spec.planner,
         "options": json.dumps(dict(entry.spec.options), sort_keys=True),
