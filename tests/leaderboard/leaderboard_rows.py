@@ -43,7 +43,7 @@ def row(scenario="a", label="p", seed=0, **changes) -> Row:
     return Row(**{**usual, **changes})
 
 
-def failed_row(scenario="a", label="p", seed=0, reason="refused") -> Row:
+def failed_row(scenario="a", label="p", seed=0, reason="refused", **changes) -> Row:
     """A flight that there is none of."""
     nothing = dict.fromkeys(
         (
@@ -58,5 +58,5 @@ def failed_row(scenario="a", label="p", seed=0, reason="refused") -> Row:
     return row(
         *(scenario, label, seed),
         **{"status": FAILED, "reason": reason, "accomplished": False, "coverage": 0.0},
-        **{"all_home": False, "wall_time_s": None, **nothing},
+        **{"all_home": False, "wall_time_s": None, **nothing, **changes},
     )

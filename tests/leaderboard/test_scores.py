@@ -64,7 +64,7 @@ def test_what_the_filter_replaced_is_averaged_over_the_flights_there_are():
     ]
     assert by_label(rows)["p"].filtered_percent == pytest.approx(15.0)
     nothing = by_label([row("a", "base"), failed_row("a", "p")])["p"]
-    assert nothing.filtered_percent == 0.0
+    assert nothing.filtered_percent is None
 
 
 def test_energy_per_percent_leaves_out_planners_that_covered_nothing():

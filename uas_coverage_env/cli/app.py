@@ -45,11 +45,6 @@ COMMANDS = (
         "Fly every planner on every scenario with every seed, and compare them.",
     ),
     CommandEntry(
-        "front",
-        at(f"{_CLI}.front:front"),
-        "Fly a planner with different options, and draw time against energy.",
-    ),
-    CommandEntry(
         "demonstrate",
         at(f"{_CLI}.demonstrate:demonstrate_command"),
         "Fly missions and keep observations and what was done, for imitation.",

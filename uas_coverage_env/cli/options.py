@@ -1,6 +1,7 @@
 """Options as they are typed: of planners, seeds, and of commands that fly many missions."""
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Container, Sequence
 from typing import Annotated
 
 import typer
@@ -27,6 +28,24 @@ BackendOption = Annotated[
     ),
 ]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Delete the flights in --out.")]
+
+
+def command_line(context: typer.Context, leave_out: Container[str] = ()) -> str:
+    """A command as it was typed, without what is as it is by default.
+
+    Args:
+        context: Of the command.
+        leave_out: Names of parameters.
+    """
+    words = ["uas-coverage", str(context.info_name)]
+    for parameter in context.command.params:
+        value = context.params.get(str(parameter.name))
+        if parameter.name in leave_out or value in (None, (), [], False, parameter.default):
+            continue
+        values = value if isinstance(value, list | tuple) else [value]
+        for each in values:
+            words += parameter.opts[-1:] if value is True else [parameter.opts[-1], str(each)]
+    return shlex.join(words)
 
 
 def options_of(pairs: Sequence[str]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 from contextlib import closing
+from functools import partial
 
 import typer
 from rich.console import Console
@@ -23,6 +24,8 @@ def fly_and_keep(
     workers: Workers,
     screen: Console,
     kept: Kept = "row",
+    *,
+    check: bool = False,
 ) -> Exception | KeyboardInterrupt | None:
     """Fly what the store lacks; returns what ended it before its end, see `end_with`.
 
@@ -32,8 +35,11 @@ def fly_and_keep(
         workers: Who flies.
         screen: Where it shows how far it is.
         kept: What is kept of each flight.
+        check: Whether the independent checker judges each; those that it has not are flown again.
     """
     there = store.keys()
+    if check:
+        there -= {row.key for row in store.rows() if row.status == FLOWN and row.verdict is None}
     todo = [entry for entry in entries if entry.key not in there]
     if todo and workers.backend == "process":
         # here and once, not in every process that flies
@@ -42,8 +48,8 @@ def fly_and_keep(
             compile_flight(
                 first.scenario, return_mode=True, safety_filter=bool(first.safety_filter)
             )
-    source = source_of(entries)
-    jobs = [Job(entry.key, fly, (entry, source, kept)) for entry in todo]
+    source, call = source_of(entries), partial(fly, check=check)
+    jobs = [Job(entry.key, call, (entry, source, kept)) for entry in todo]
     try:
         with (
             missions_shown(screen, len(entries), len(entries) - len(todo)) as told,
@@ -51,7 +57,7 @@ def fly_and_keep(
         ):
             for _, flown in results:
                 flown.write(store.path.parent)
-                store.add(flown.row)
+                store.add(flown.row, replace=check)
                 told(f"{flown.row.scenario} {flown.row.label} {flown.row.seed}")
     except (KeyboardInterrupt, WorkerLostError) as error:
         return error
@@ -87,18 +93,18 @@ def refuse_former(store: Store[Row], entries: Sequence[Entry]) -> None:
 
 
 def end_with(rows: Sequence[Row], trouble: BaseException | None) -> None:
-    """Say what could not be flown, and end a command; what was flown is kept.
+    """Say what is wrong with the flights, see `failures`, and end a command; they are kept.
 
     Raises:
         KeyboardInterrupt: It was stopped by hand.
-        typer.Exit: Something could not be flown.
+        typer.Exit: Something is wrong with one, or it was not flown.
     """
-    failed = [row for row in rows if row.status != FLOWN]
-    for line in failures(failed):
+    wrong = failures(rows)
+    for line in wrong:
         sys.stderr.write(f"error: {one_line(line)}\n")
     if isinstance(trouble, KeyboardInterrupt):
         raise trouble
     if trouble is not None:
         sys.stderr.write(f"error: {one_line(str(trouble))}; the same command goes on\n")
-    if failed or trouble:
+    if wrong or trouble:
         raise typer.Exit(FAILED)

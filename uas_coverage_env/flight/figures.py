@@ -339,7 +339,7 @@ FIGURES = (
     Figure("episode_return", float, metrics.episode_return,
            "sum of the rewards of all steps and UAS, not discounted; absent where there is no "
            "`rewards.csv`", "return", digits=1, key="return", optional=True, table="outcome"),
-    Figure("reward_terms", dict, metrics.reward_sums, "the parts of it; likewise",
+    Figure("reward_terms", dict, lambda flight: metrics.reward_sums(flight) or None, "the parts of it; likewise",
            optional=True, shown=False),
     Figure("estimated", list, _of_log("estimates"),
            "of a flight from logs, what was not measured: `uas`, `what` (charge, current, voltage, "
@@ -407,13 +407,14 @@ FIGURES = (
            "processor p95", "ms", over="most", key="", repeats=False),
     Figure("fallbacks", int, metrics.n_fallbacks, "decisions flown on a fallback",
            absent=0, over="total", table="outcome"),
-    Figure("fallback_reasons", dict, metrics.fallback_reasons,
+    Figure("fallback_reasons", dict, lambda flight: metrics.fallback_reasons(flight) or None,
            "why there were fallbacks → how many; absent where there were none",
            text=lambda reasons: ", ".join(f"{n} {why}" for why, n in reasons.items()),
            optional=True),
-    Figure("filtered_share", float, metrics.filtered_share,
+    Figure("filtered_share", float,
+           lambda flight: metrics.filtered_share(flight) if flight.safety_filter else None,
            "share of the commands that the safety filter replaced; absent where it is off",
-           "commands filtered", digits=1, optional=True, absent=0.0, over="average",
+           "filtered", digits=1, optional=True, absent=0.0, over="average",
            table="outcome"),
     Figure("mip_gap_p50", float, metrics.mip_gap_p50,
            "median gap of the joint program, relative to what the plan can influence; null where "

@@ -86,18 +86,17 @@ def packs_used(flight: FlightRecord) -> dict[str, int]:
     return {name: 1 + swaps[name] for name in flight.names}
 
 
-def reward_sums(flight: FlightRecord) -> dict[str, float] | None:
-    """Term of the reward -> its sum over all steps and UAS; None where none were kept."""
+def reward_sums(flight: FlightRecord) -> dict[str, float]:
+    """Term of the reward -> its sum over all steps and UAS; empty where none were kept."""
     if flight.reward_terms is None:
-        return None
+        return {}
     sums = flight.reward_terms.sum(axis=(0, 1)).tolist()
     return dict(zip(flight.reward_names, sums, strict=True))
 
 
 def episode_return(flight: FlightRecord) -> float | None:
     """The sum of all rewards, not discounted; None where none were kept."""
-    sums = reward_sums(flight)
-    return None if sums is None else float(sum(sums.values()))
+    return None if flight.reward_terms is None else float(sum(reward_sums(flight).values()))
 
 
 def home(flight: FlightRecord) -> NDArray[np.bool_]:
@@ -176,10 +175,8 @@ def mip_gap_p50(flight: FlightRecord) -> float | None:
     return float(np.median(gaps)) if gaps else None
 
 
-def filtered_share(flight: FlightRecord) -> float | None:
-    """Share of the commands that the safety filter replaced, 0..1; None where it is off."""
-    if not flight.safety_filter:
-        return None
+def filtered_share(flight: FlightRecord) -> float:
+    """Share of the commands that the safety filter replaced, 0..1; 0 where there was none."""
     commands = int(flight.last_sample.sum())
     return sum(decision.filtered for decision in flight.decisions) / max(commands, 1)
 
@@ -232,12 +229,12 @@ def _landing(flight: FlightRecord, i: int, k: int) -> VerticalFlight:
     return landing(flight.scenario, i, x[:3].tolist(), float(x[DOD]), float(x[U_TH]))
 
 
-def fallback_reasons(flight: FlightRecord) -> dict[str, int] | None:
-    """Why there were fallbacks, and how many: the most frequent reason first; None: no fallback."""
+def fallback_reasons(flight: FlightRecord) -> dict[str, int]:
+    """Why there were fallbacks, and how many: the most frequent reason first."""
     reasons = Counter(
         decision.reason or "no reason given" for decision in flight.decisions if decision.fallback
     )
-    return dict(reasons.most_common()) or None
+    return dict(reasons.most_common())
 
 
 def reasons_left_open(entries: Sequence[Mapping[str, Any]]) -> str:

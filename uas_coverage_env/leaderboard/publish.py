@@ -5,7 +5,7 @@ import dataclasses
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,8 +14,9 @@ from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.bounds import Bounds
+from uas_coverage_env.leaderboard.front import Fronts, front_cells, front_figure
 from uas_coverage_env.leaderboard.hardware import machine, versions
-from uas_coverage_env.leaderboard.picture import picture
+from uas_coverage_env.leaderboard.picture import drawn, leaderboard_figure
 from uas_coverage_env.leaderboard.row import FAILED, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
 from uas_coverage_env.leaderboard.table import cells, markdown, notes, scenarios_cells
@@ -24,6 +25,7 @@ from uas_coverage_env.runner.store import columns_of
 
 FLIGHTS, TABLE, SCORES = "flights.parquet", "table.md", "table.json"
 PICTURE = "coverage-energy.png"
+FRONT, FRONT_PICTURE = "front.md", "front.png"
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class Comparison:
         command: The command line that made it.
         jobs: How it was flown, for people.
         scores: Of each planner, best first.
+        fronts: Of each mission, where options were varied: time against energy.
     """
 
     rows: Sequence[Row]
@@ -45,6 +48,7 @@ class Comparison:
     command: str
     jobs: str
     scores: Sequence[Scores]
+    fronts: Fronts = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -55,9 +59,11 @@ class Comparison:
         command: str,
         jobs: str,
         bounds: Bounds = MappingProxyType({}),
+        fronts: Fronts = MappingProxyType({}),
     ) -> "Comparison":
         """Sum up rows, of which there is at least one."""
-        return cls(rows, planned, reference, command, jobs, scores_of(rows, reference, bounds))
+        scores = scores_of(rows, reference, bounds)
+        return cls(rows, planned, reference, command, jobs, scores, fronts)
 
     def circumstances(self) -> list[str]:
         """Command, extent, machine and versions, a line each."""
@@ -90,8 +96,16 @@ def write(comparison: Comparison, directory: Path) -> list[str]:
         "table.csv": _csv(comparison.scores).encode(),
         SCORES: _json(comparison).encode(),
         TABLE: _markdown(comparison).encode(),
-        PICTURE: picture(comparison.scores, comparison.rows, comparison.reference),
+        PICTURE: drawn(
+            lambda: leaderboard_figure(comparison.scores, comparison.rows, comparison.reference)
+        ),
     }
+    if fronts := comparison.fronts:
+        parts = [f"`{comparison.command}`\n"]
+        for name, choices in fronts.items():
+            parts += [f"{name}:\n", markdown(front_cells(choices))]
+        files[FRONT] = "\n".join(parts).encode()
+        files[FRONT_PICTURE] = drawn(lambda: front_figure(fronts))
     there = {name: content for name, content in files.items() if content is not None}
     write_files(directory, there)
     return list(there)
@@ -168,21 +182,30 @@ def _markdown(comparison: Comparison) -> str:
     if len(labels) > 1 and reference in labels:
         parts.append(markdown(cells(comparison.scores, "reference", reference)))
     parts += [f"{line}\n" for line in notes(rows, reference)]
-    failed = [row for row in rows if row.status == FAILED]
-    if failed:
-        parts.append("".join(f"- {line}\n" for line in failures(failed)))
+    if lines := failures(rows):
+        parts.append("".join(f"- {line}\n" for line in lines))
     parts.append("Energy and steps on each scenario, means of the accomplished flights:\n")
     parts.append(markdown(scenarios_cells(rows, labels)))
     return "\n".join(parts)
 
 
-def failures(failed: Sequence[Row]) -> list[str]:
-    """Why flights failed, a line for each reason of each planner."""
-    found: dict[tuple[str, str], list[Row]] = {}
-    for row in failed:
-        found.setdefault((row.label, row.reason or ""), []).append(row)
+def failures(rows: Sequence[Row]) -> list[str]:
+    """What is wrong with flights, a line for each reason of each planner: empty where nothing is.
+
+    They could not be flown, the independent checker disagrees, or figures could not be computed.
+    """
+    found: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        wrong = {
+            "failed": row.reason if row.status == FAILED else None,
+            "disagrees with the independent checker on": row.verdict if row.disagrees else None,
+            "lacks figures of": row.failed_figures,
+        }
+        for what, why in wrong.items():
+            if why is not None:
+                found.setdefault((row.label, what, why), []).append(row)
     return [
-        f"{label} failed {len(rows)} {'flight' if len(rows) == 1 else 'flights'} "
-        f"(first: {rows[0].scenario}, seed {rows[0].seed}): {reason}"
-        for (label, reason), rows in found.items()
+        f"{label} {what} {len(those)} {'flight' if len(those) == 1 else 'flights'} "
+        f"(first: {those[0].scenario}, seed {those[0].seed}): {why}"
+        for (label, what, why), those in found.items()
     ]

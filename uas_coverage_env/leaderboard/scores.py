@@ -342,9 +342,9 @@ _COUNTED = (
 )  # fmt: skip
 
 _FURTHER = (
-    Column("violating", "flights with violations", "flights with a violation",
+    Column("violating", "violating", "flights with a violation",
            _number_of(lambda row: row.violations > 0), "d", "outcome"),
-    Column("worst_coverage_percent", "least covered, %", "the least of all flights",
+    Column("worst_coverage_percent", "worst, %", "the least covered of all flights",
            lambda it: _PERCENT * min(row.coverage for row in it.rows), ".0f", "outcome"),
     Column("mean_coverage_percent", "mean covered, %", "the mean, which one bad flight changes",
            _coverage(mean), ".1f"),
