@@ -339,8 +339,8 @@ FIGURES = (
     Figure("episode_return", float, metrics.episode_return,
            "sum of the rewards of all steps and UAS, not discounted; absent where there is no "
            "`rewards.csv`", "return", digits=1, key="return", optional=True, table="outcome"),
-    Figure("reward_terms", dict, lambda flight: metrics.reward_sums(flight) or None, "the parts of it; likewise",
-           optional=True, shown=False),
+    Figure("reward_terms", dict, lambda flight: metrics.reward_sums(flight) or None,
+           "the parts of it; likewise", optional=True, shown=False),
     Figure("estimated", list, _of_log("estimates"),
            "of a flight from logs, what was not measured: `uas`, `what` (charge, current, voltage, "
            "height, position, attitude, flight), `how`; absent of other flights",
