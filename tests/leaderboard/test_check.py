@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from uas_coverage_env.cli import main
@@ -38,7 +39,7 @@ def test_the_checker_agrees_with_a_flight_as_it_was_flown(flight):
         (lambda f: {"breaches": f.breaches + 1}, "breaches is 0, the summary says 1"),
         (lambda f: {"covered": f.covered - 1}, "coverage is 1.0, the summary says 0.5"),
         (lambda f: {"voltage_V": f.voltage_V * 2, "current_A": f.current_A * 2}, "violations are"),
-        (lambda f: {"x": f.x + [[[5.0] + 13 * [0.0]]]}, "left does not begin at its start"),
+        (lambda f: {"x": f.x + np.eye(14)[0] * 5.0}, "left does not begin at its start"),
     ],
 )
 def test_it_says_in_what_it_disagrees(flight, changes, said):

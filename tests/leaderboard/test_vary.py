@@ -60,7 +60,7 @@ def test_all_combinations_of_values_are_flown():
     assert len(specs) == 4
     options = [(s.options["filter"], s.options["return_mode"]) for s in specs.values()]
     assert sorted(options) == [(False, False), (False, True), (True, False), (True, True)]
-    assert list(specs)[0] == "lawnmower+filter-true+return_mode-true"
+    assert next(iter(specs)) == "lawnmower+filter-true+return_mode-true"
 
 
 def test_what_is_varied_of_one_planner_leaves_the_others_as_they_are():

@@ -392,7 +392,7 @@ FIGURES = (
     Figure("decision_processor_s", dict, metrics.processor_time_s,
            "the same of its processor time, all threads added; absent of flights of versions "
            "before", optional=True, shown=False),
-    Figure("decisions", int, lambda flight: len(flight.decisions), "of the planner",
+    Figure("decisions", int, lambda flight: len(flight.decisions), "of the planner, one a step",
            over="total", absent=0, key="", table=""),
     Figure("decision_p50_s", float, _percentile(_WALL, "p50"), "median time of a decision",
            "decision p50", "ms", over="median", key="", repeats=False),

@@ -189,6 +189,7 @@ def _of_figure(figure: Figure) -> Iterator[Column]:
     heading = figure.label if unit != "%" else f"{figure.title}, %"
     digits = 1 if unit == "%" or figure.kind is not float else figure.digits
     form = "" if unit == "ms" else f".{digits}f"
+    meaning = f"{_OVER[figure.over]} `{figure.name}`{_OF[figure.counts]}"
 
     def measure(row: Row) -> float | None:
         value = getattr(row, figure.name) if _COUNTS[figure.counts](row) else None
@@ -198,7 +199,7 @@ def _of_figure(figure: Figure) -> Iterator[Column]:
         yield Column(
             name,
             heading,
-            figure.meaning,
+            meaning,
             lambda flights: estimate(_values(flights.mine, measure), flights.over),
             form,
             figure.table,
@@ -216,16 +217,30 @@ def _of_figure(figure: Figure) -> Iterator[Column]:
         yield Column(
             name,
             heading,
-            figure.meaning,
+            f"flights with `{figure.name}`",
             of,
             table=figure.table,
             text=lambda scores: f"{scores.figures[name]}/{scores.flights}",
         )
     else:
         form = "d" if figure.over == "total" else form
-        yield Column(name, heading, figure.meaning, of, form, figure.table)
+        yield Column(name, heading, meaning, of, form, figure.table)
 
 
+_OVER = {
+    "mean": "interquartile mean of",
+    "average": "mean of",
+    "total": "sum of",
+    "median": "median of",
+    "least": "least",
+    "most": "largest",
+}
+_OF = {
+    "all": "",
+    "flown": "",
+    "unharmed": ", of flights without a violation",
+    "accomplished": ", of accomplished flights",
+}
 _COUNTS: dict[str, Callable[[Row], bool]] = {
     "all": lambda row: True,
     "flown": lambda row: row.status == FLOWN,
