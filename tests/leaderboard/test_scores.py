@@ -278,3 +278,34 @@ def test_a_note_names_the_planners_that_fly_alike_with_every_seed():
     ]
     assert notes(rows, "same")[-1].endswith("one suffices: same.")
     assert not any("suffices" in line for line in notes(rows[:1], "same"))
+
+
+@pytest.mark.parametrize(
+    ("figure", "value", "cell"),
+    [
+        (Figure("spare_Wh", float, len, ""), 2.0, "2.00 [1.00, 3.00]"),
+        (Figure("spare_share", float, len, ""), 200.0, "200.0 [100.0, 300.0]"),
+        (Figure("spare_Wh", float, len, "", over="total"), 4.0, "4.00"),
+        (Figure("spare_Wh", float, len, "", over="most", digits=0), 3.0, "3"),
+        (Figure("spare_Wh", float, len, "", over="least"), 1.0, "1.00"),
+        (Figure("wait_s", float, len, "", over="average", unit="ms"), 2000.0, "2000"),
+        (Figure("spares", int, len, "", over="total"), 4, "4"),
+        (Figure("spares", int, len, "", over="median"), 2.0, "2.0"),
+        (Figure("spare", bool, len, ""), 4, "4/2"),
+    ],
+)
+def test_a_figure_is_summed_up_over_flights_as_it_says(figure, value, cell):
+    class Flown:
+        status, spares = FLOWN, 0
+
+        def __init__(self, found):
+            self.found = found
+
+        def __getattr__(self, name):
+            return self.found
+
+    column = scores._of_figure(figure)
+    rows = [[Flown(1.0), Flown(3.0)]]
+    found = column.of(scores.Flights(rows, rows, "seeds", "seeds", {}))
+    assert getattr(found, "value", found) == value
+    assert column.cell(scores.Scores("p", {column.name: found, "flights": 2})) == cell

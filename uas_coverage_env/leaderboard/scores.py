@@ -4,7 +4,7 @@ Every figure of a flight (`flight.figures`) has a column; `_FURTHER` has those t
 one figure, the bounds, or the flights of the reference.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any, Literal
@@ -132,7 +132,7 @@ class Column:
 
 def columns() -> dict[str, Column]:
     """All columns by name: those of figures in their order, then those made of several."""
-    ours = [column for each in figures().values() if each.in_rows for column in _of_figure(each)]
+    ours = [_of_figure(each) for each in figures().values() if each.in_rows]
     return {column.name: column for column in (*_COUNTED, *ours, *_FURTHER)}
 
 
@@ -181,50 +181,37 @@ def _place(scores: Scores) -> tuple[Any, ...]:
 Measure = Callable[[Row], float | None]
 
 
-def _of_figure(figure: Figure) -> Iterator[Column]:
-    """The column of a figure: over flights it is summed up as it says."""
+def _of_figure(figure: Figure) -> Column:
+    """The column of a figure: over flights it is summed up as it says, a truth is counted."""
     unit, name = figure.printed_unit, figure.name
     if unit in _SUFFIXES:
         name = f"{name.removesuffix('_share').removesuffix('_s')}{_SUFFIXES[unit]}"
     heading = figure.label if unit != "%" else f"{figure.title}, %"
+    over = "total" if figure.kind is bool else figure.over
+    whole = over == "total" and figure.kind is not float
     digits = 1 if unit == "%" or figure.kind is not float else figure.digits
-    form = "" if unit == "ms" else f".{digits}f"
-    meaning = f"{_OVER[figure.over]} `{figure.name}`{_OF[figure.counts]}"
+    form = "d" if whole else "" if unit == "ms" else f".{digits}f"
 
     def measure(row: Row) -> float | None:
         value = getattr(row, figure.name) if _COUNTS[figure.counts](row) else None
         return None if value is None else figure.scale * value
 
-    if figure.over == "mean":
-        yield Column(
-            name,
-            heading,
-            meaning,
-            lambda flights: estimate(_values(flights.mine, measure), flights.over),
-            form,
-            figure.table,
-        )
-        return
-    summed_up = _SUMMED_UP[figure.over]
-
     def of(flights: Flights) -> Value:
+        if over == "mean":
+            return estimate(_values(flights.mine, measure), flights.over)
         there = [value for row in flights.rows if (value := measure(row)) is not None]
-        if figure.over == "total":
+        if whole:
             return int(sum(there))
-        return float(summed_up(there)) if there else None
+        return float(_SUMMED_UP[over](there)) if there else None
 
+    def counted(scores: Scores) -> str:
+        return f"{scores.figures[name]}/{scores.flights}"
+
+    meaning = f"{_OVER[over]} `{figure.name}`{_OF[figure.counts]}"
     if figure.kind is bool:
-        yield Column(
-            name,
-            heading,
-            f"flights with `{figure.name}`",
-            of,
-            table=figure.table,
-            text=lambda scores: f"{scores.figures[name]}/{scores.flights}",
-        )
-    else:
-        form = "d" if figure.over == "total" else form
-        yield Column(name, heading, meaning, of, form, figure.table)
+        meaning = f"flights with `{figure.name}`"
+    text = counted if figure.kind is bool else None
+    return Column(name, heading, meaning, of, form, figure.table, text)
 
 
 _OVER = {
