@@ -1,7 +1,7 @@
 """What the commands that fly many missions share: the flights, what is shown, how they end."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from contextlib import closing
 
 import typer
@@ -23,6 +23,7 @@ def fly_and_keep(
     workers: Workers,
     screen: Console,
     kept: Kept = "row",
+    again: Set[str] = frozenset(),
 ) -> Exception | KeyboardInterrupt | None:
     """Fly what the store lacks; returns what ended it before its end, see `end_with`.
 
@@ -32,8 +33,9 @@ def fly_and_keep(
         workers: Who flies.
         screen: Where it shows how far it is.
         kept: What is kept of each flight.
+        again: Keys of flights that are flown anew where the store holds them.
     """
-    there = store.keys()
+    there = store.keys() - again
     todo = [entry for entry in entries if entry.key not in there]
     if todo and workers.backend == "process":
         # here and once, not in every process that flies
@@ -51,7 +53,7 @@ def fly_and_keep(
         ):
             for _, flown in results:
                 flown.write(store.path.parent)
-                store.add(flown.row)
+                store.add(flown.row, replace=flown.row.key in again)
                 told(f"{flown.row.scenario} {flown.row.label} {flown.row.seed}")
     except (KeyboardInterrupt, WorkerLostError) as error:
         return error

@@ -50,21 +50,25 @@ class Store(Generic[Record]):
         """The keys of all flights it holds."""
         return {key for (key,) in self._connection.execute("SELECT key FROM flights")}
 
-    def add(self, row: Record) -> None:
+    def add(self, row: Record, *, replace: bool = False) -> None:
         """Keep a flight; on return it is on the disk.
 
+        Args:
+            row: The flight.
+            replace: Forget the one of the same key.
+
         Raises:
-            ValueError: It holds the flight already, or a value cannot be kept.
+            ValueError: It holds the flight already and `replace` is not set, or a value cannot be kept.
             InputError: The disk is full or gone.
         """
         names = list(columns_of(self._record))
         values = [getattr(row, name) for name in names]
         _checked(self._record, values)
-        places = ", ".join("?" * len(values))
+        places, verb = ", ".join("?" * len(values)), "REPLACE" if replace else "INSERT"
         try:
             with self._connection:
                 self._connection.execute(
-                    f"INSERT INTO flights ({', '.join(names)}) VALUES ({places})", values
+                    f"{verb} INTO flights ({', '.join(names)}) VALUES ({places})", values
                 )
         except sqlite3.IntegrityError as error:
             raise ValueError(f"flight {values[0]} is in {self.path} already: {error}") from error
