@@ -331,7 +331,7 @@ MISTAKES = {
     "unknown reference": (["--reference", "tour"], "tour"),
     "unknown backend": (["--backend", "dask"], "dask"),
     "no jobs": (["--jobs", "0"], "jobs"),
-    "nothing to reuse": (["--reuse", "nowhere"], "holds no sweep"),
+    "nothing to reuse": (["--reuse", "nowhere"], "holds no flights"),
     "a file": (["--out", "taken.txt"], "is a file"),
 }
 

@@ -221,7 +221,7 @@ def test_what_is_published_is_read_again(tmp_path):
 
 
 def test_what_is_no_comparison_of_this_version_is_refused(tmp_path):
-    with pytest.raises(InputError, match="holds no sweep that can be read"):
+    with pytest.raises(InputError, match="holds no flights that can be read"):
         published(tmp_path)
     kept([row("a", "base")], tmp_path)
     table = tmp_path / "table.json"

@@ -83,7 +83,7 @@ def test_another_sweep_is_refused_and_told_apart_unless_overwritten(tmp_path):
     (tmp_path / "notes.txt").write_text("keep")
     other = {**SWEEP, "seeds": "0:3"}
     with (
-        pytest.raises(InputError, match="another sweep: seeds is 0:2 there, 0:3 asked for"),
+        pytest.raises(InputError, match="another command: seeds is 0:2 there, 0:3 asked for"),
         opened(tmp_path, other),
     ):
         pass
@@ -96,7 +96,7 @@ def test_another_sweep_is_refused_and_told_apart_unless_overwritten(tmp_path):
 def test_a_folder_of_other_things_is_refused_unless_overwritten(tmp_path):
     (tmp_path / "notes.txt").write_text("keep")
     with (
-        pytest.raises(InputError, match="is not empty and holds no sweep"),
+        pytest.raises(InputError, match="is not empty and holds no flights"),
         opened(tmp_path, SWEEP),
     ):
         pass
@@ -149,7 +149,7 @@ def test_a_value_that_we_do_not_write_is_named_by_its_column(tmp_path, column, v
             store.rows()
     assert f"{column} of a flight is " in str(caught.value)
     assert "\n" not in str(caught.value)
-    with pytest.raises(InputError, match="holds no sweep that can be read"):
+    with pytest.raises(InputError, match="holds no flights that can be read"):
         rows_in(tmp_path, Row)
 
 
