@@ -1,7 +1,7 @@
 """What the commands that fly many missions share: the flights, what is shown, how they end."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from contextlib import closing
 from functools import partial
 
@@ -24,6 +24,7 @@ def fly_and_keep(
     workers: Workers,
     screen: Console,
     kept: Kept = "row",
+    again: Set[str] = frozenset(),
     *,
     check: bool = False,
 ) -> Exception | KeyboardInterrupt | None:
@@ -35,11 +36,12 @@ def fly_and_keep(
         workers: Who flies.
         screen: Where it shows how far it is.
         kept: What is kept of each flight.
-        check: Whether the independent checker judges each; those that it has not are flown again.
+        again: Keys of flights that are flown anew where the store holds them.
+        check: Whether the independent checker judges each; those that it has not are flown anew.
     """
-    there = store.keys()
     if check:
-        there -= {row.key for row in store.rows() if row.status == FLOWN and row.verdict is None}
+        again |= {row.key for row in store.rows() if row.status == FLOWN and row.verdict is None}
+    there = store.keys() - again
     todo = [entry for entry in entries if entry.key not in there]
     if todo and workers.backend == "process":
         # here and once, not in every process that flies
@@ -57,7 +59,7 @@ def fly_and_keep(
         ):
             for _, flown in results:
                 flown.write(store.path.parent)
-                store.add(flown.row, replace=check)
+                store.add(flown.row, replace=flown.row.key in again)
                 told(f"{flown.row.scenario} {flown.row.label} {flown.row.seed}")
     except (KeyboardInterrupt, WorkerLostError) as error:
         return error

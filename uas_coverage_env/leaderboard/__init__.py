@@ -6,6 +6,7 @@ from uas_coverage_env.leaderboard.picture import leaderboard_figure
 from uas_coverage_env.leaderboard.planner_specs import PlannerSpec, planner_specs_of
 from uas_coverage_env.leaderboard.publish import (
     FLIGHTS,
+    SCORES,
     Comparison,
     failures,
     parquet,
@@ -25,6 +26,7 @@ __all__ = [
     "FAILED",
     "FLIGHTS",
     "FLOWN",
+    "SCORES",
     "SETS",
     "TIMES",
     "Bounds",

@@ -55,20 +55,20 @@ class Store(Generic[Record]):
 
         Args:
             row: The flight.
-            replace: Whether it takes the place of one with its key.
+            replace: Forget the one of the same key.
 
         Raises:
-            ValueError: It holds the flight already, unless `replace`, or a value cannot be kept.
+            ValueError: It holds the flight and `replace` is not set, or a value cannot be kept.
             InputError: The disk is full or gone.
         """
         names = list(columns_of(self._record))
         values = [getattr(row, name) for name in names]
         _checked(self._record, values)
-        places, how = ", ".join("?" * len(values)), "OR REPLACE " if replace else ""
+        places, verb = ", ".join("?" * len(values)), "REPLACE" if replace else "INSERT"
         try:
             with self._connection:
                 self._connection.execute(
-                    f"INSERT {how}INTO flights ({', '.join(names)}) VALUES ({places})", values
+                    f"{verb} INTO flights ({', '.join(names)}) VALUES ({places})", values
                 )
         except sqlite3.IntegrityError as error:
             raise ValueError(f"flight {values[0]} is in {self.path} already: {error}") from error
@@ -169,7 +169,7 @@ def rows_in(directory: Path, record: type[Record]) -> list[Record]:
     except OtherVersionError as error:
         raise InputError(f"{path}: {error}; fly them anew") from error
     except sqlite3.DatabaseError as error:
-        raise InputError(f"{directory}: holds no sweep that can be read ({error})") from error
+        raise InputError(f"{directory}: holds no flights that can be read ({error})") from error
 
 
 def difference(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
@@ -223,7 +223,7 @@ def _make_sure_it_is(store: Store[Any], directory: Path, description: Mapping[st
         store.begin(asked)
     elif kept != asked:
         raise InputError(
-            f"{directory}: holds another sweep: {difference(kept, asked)}; "
+            f"{directory}: holds the flights of another command: {difference(kept, asked)}; "
             "give another --out or add --overwrite"
         )
 
@@ -236,7 +236,7 @@ def _make_folder(directory: Path, *, overwrite: bool) -> None:
         if (directory / name).exists():
             raise InputError(f"{directory}: holds {name} of version 0.3.0 or older; {_ANEW}")
     raise InputError(
-        f"{directory}: is not empty and holds no sweep; give another --out or add --overwrite"
+        f"{directory}: is not empty and holds no flights; give another --out or add --overwrite"
     )
 
 
