@@ -32,7 +32,7 @@ from uas_coverage_env.bound.carried import Carried
 from uas_coverage_env.bound.legs import LegBounds, straight_directions
 from uas_coverage_env.bound.prices import WITHIN, Prices
 from uas_coverage_env.bound.turning import Motion, Turning, motion_of
-from uas_coverage_env.flight import energy_Wh
+from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY
 

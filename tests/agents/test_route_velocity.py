@@ -40,7 +40,7 @@ from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import PLENTY_M
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.vehicle.layout import VX, VY, X, Y, Z
 from uas_coverage_env.world import Velocity, build_arena

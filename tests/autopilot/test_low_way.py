@@ -7,7 +7,7 @@ from uas_coverage_env import World, load_planner, rollout
 from uas_coverage_env.autopilot.low_altitude_return import LITTLE_MPS, low_way
 from uas_coverage_env.entities.state import FLYING, LANDED, WIND
 from uas_coverage_env.features.wind import Wind
-from uas_coverage_env.flight import home
+from uas_coverage_env.flight.metrics import home
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.world import GoTo
 

@@ -13,7 +13,7 @@ from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env.flight.metrics import accomplished
 
 QUICK = {"deterministic": True, "at_once": 1, "horizon": 8, "threads": 1, "teams": 2}
 

@@ -15,7 +15,7 @@ from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_env import Flight, MissionBrief, World, rollout
 from uas_coverage_env.entities.state import FLYING, LANDED, LOST
 from uas_coverage_env.files.strict_toml import InputError, parse
-from uas_coverage_env.flight import accomplished, coverage, energy_Wh, home
+from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.flight.record import MODES
 from uas_coverage_env.mission import first_sight
 from uas_coverage_env.mission.handover import SILENT_S

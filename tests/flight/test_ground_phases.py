@@ -3,7 +3,8 @@
 import pytest
 from small_worlds import box, meadow
 
-from uas_coverage_env.flight import rollout, summary
+from uas_coverage_env.flight import rollout
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.mission import first_sight
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.scenario import Scenario

@@ -8,7 +8,8 @@ import pytest
 from uas_coverage_env import Flight, generate_scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, covered_at, rest_of
+from uas_coverage_env.flight import covered_at, rest_of
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.flight.record import LOST
 
 

@@ -18,7 +18,8 @@ from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Flight, accomplished, load_planner, rollout
+from uas_coverage_env.flight import Flight, load_planner, rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.layout import VX, VY

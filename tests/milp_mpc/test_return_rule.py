@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from practice_missions import corners, mission, obstacle
 from uas_coverage_baselines.milp_mpc.return_rule import ReturnRule
 
-from uas_coverage_env.flight import load_planner, rollout, summary
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.params import return_threshold

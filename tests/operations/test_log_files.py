@@ -18,7 +18,7 @@ from flown_flights import FLIES_S, FRAME, WAYPOINTS_M, geodetic, judged, places_
 from uas_coverage_env import Flight
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import energy_Wh
+from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.flight.record import LANDED
 from uas_coverage_env.operations import flown_flight, read_log
 

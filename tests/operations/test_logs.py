@@ -21,7 +21,8 @@ from test_export import random_flight
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, covered_at, rest_of
+from uas_coverage_env.flight import covered_at, rest_of
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.operations import LocalFrame, flown_flight, read_log
 from uas_coverage_env.operations.flown_way import AT_HOME_M

@@ -12,7 +12,7 @@ from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 from uas_coverage_baselines.trajectory.improving import Improvement
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.vehicle.layout import VX, VZ
 

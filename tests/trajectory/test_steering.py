@@ -7,7 +7,8 @@ from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_baselines.trajectory.steering import FAILURES, Failures
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import MODES, accomplished, coverage, energy_Wh, home
+from uas_coverage_env.flight import MODES
+from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 from uas_coverage_env.tasks import level_named, seeds_of

@@ -9,8 +9,7 @@ from uas_coverage_baselines.trajectory.mission_plan import plan_mission
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 
 from uas_coverage_env import Scenario, rollout
-from uas_coverage_env.flight import accomplished, energy_Wh, fallback_reasons
-from uas_coverage_env.flight.metrics import home
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh, fallback_reasons, home
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World

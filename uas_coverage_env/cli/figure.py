@@ -10,8 +10,7 @@ from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.leaderboard import FLIGHTS, leaderboard_figure, published, scores_of
-from uas_coverage_env.replay.figure_kinds import KINDS, figure_of
+from uas_coverage_env.leaderboard import SCORES, leaderboard_figure, published, scores_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,9 +109,9 @@ def _drawn(directories: list[Path], kind: str, step: int | None) -> "Figure":
 
 def _check_sort(directory: Path, kind: str, curve: str) -> None:
     """Whether a directory is of the sort that the kind draws, as far as its files tell."""
-    sorts = {FLIGHTS: "a comparison", curve: "a training", "flight.csv": "a flight"}
-    kinds = {FLIGHTS: _LEADERBOARD, curve: _TRAINING, "flight.csv": _FLIGHT_KINDS}
-    wanted = {_LEADERBOARD: FLIGHTS, _TRAINING: curve}.get(kind, "flight.csv")
+    sorts = {SCORES: "a comparison", curve: "a training", "flight.csv": "a flight"}
+    kinds = {SCORES: _LEADERBOARD, curve: _TRAINING, "flight.csv": _FLIGHT_KINDS}
+    wanted = {_LEADERBOARD: SCORES, _TRAINING: curve}.get(kind, "flight.csv")
     if (directory / wanted).is_file():
         return
     for file, sort in sorts.items():

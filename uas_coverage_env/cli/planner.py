@@ -11,7 +11,8 @@ from rich.table import Table
 
 from uas_coverage_env.cli import completion
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.flight import PlannerDescription, describe_planner, describe_planners
+from uas_coverage_env.flight import describe_planners
+from uas_coverage_env.flight.registry import PlannerDescription, describe_planner
 
 
 def list_planners(

@@ -4,12 +4,18 @@ from pathlib import Path
 from typing import Self
 
 from uas_coverage_env.flight.directory import write_flight
+from uas_coverage_env.flight.figures import FlightFigures
 from uas_coverage_env.flight.reading import read_flight
 from uas_coverage_env.flight.record import FlightRecord
 
 
 class Flight(FlightRecord):
     """One mission as it was flown; its fields are those of `FlightRecord`."""
+
+    @property
+    def figures(self) -> FlightFigures:
+        """Its figures by name, as in `flight.figures["energy_Wh"]`; docs/flight_directory.md."""
+        return FlightFigures(self)
 
     def save(self, directory: str | Path, *, overwrite: bool = False) -> Path:
         """Write the flight as a flight directory, see `uas_coverage_env.flight.directory`.

@@ -108,6 +108,7 @@ class _Decision(StrictModel):
     mip_gap: float | None = None
     filtered: Count = 0
     reason: str | None = None
+    processor_s: Seconds | None = None
 
 
 class _Event(StrictModel):
