@@ -24,7 +24,7 @@ from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRout
 from uas_coverage_env import generate_scenario, rollout
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.lookahead import fixed_slack
-from uas_coverage_env.entities.commands import VELOCITY
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.raised import raised

@@ -18,7 +18,7 @@ from uas_coverage_agents.waypoint.team import ENERGY, LEFT, NO_UAS, TIME
 from waypoint_missions import PRIOR, tensors, town, with_something_parked
 
 from uas_coverage_env import rollout
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.simulation.pool import pool_worlds

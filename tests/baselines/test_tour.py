@@ -7,6 +7,7 @@ from uas_coverage_baselines.tour import Tour, TourOptions
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
 from uas_coverage_env import load_scenario, rollout
+from uas_coverage_env.entities.state import LOST
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.flight.metrics import accomplished, coverage, home
 from uas_coverage_env.mission import MissionBrief

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 from uas_coverage_env.cli import main
-from uas_coverage_env.tasks import LEVELS
 from uas_coverage_env.files.suggestions import did_you_mean
+from uas_coverage_env.tasks import LEVELS
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

@@ -10,6 +10,8 @@ from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.entities.state import LOST
 from uas_coverage_env.flight import load_planner, rollout
 from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import MissionBrief, first_sight

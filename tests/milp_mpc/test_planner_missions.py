@@ -6,6 +6,7 @@ from practice_missions import fly, mission, planner, with_uas
 from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
+from uas_coverage_env.entities.state import LANDED
 from uas_coverage_env.flight import load_planner, rollout
 from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import generate_scenario, load_scenario

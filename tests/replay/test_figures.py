@@ -12,6 +12,7 @@ from matplotlib.patches import Rectangle
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES
 from uas_coverage_env.flight.record import DecisionRecord
+from uas_coverage_env.replay.figure_kinds import KINDS, figure_of
 from uas_coverage_env.replay.figures import (
     battery_figure,
     decision_time_figure,

@@ -14,7 +14,7 @@ from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.flight import Flight, rest_of
 from uas_coverage_env.flight.metrics import accomplished, coverage, open_waypoints
 from uas_coverage_env.flight.scene_history import SceneHistory
-from uas_coverage_env.scenario import Room, Scenario, warnings
+from uas_coverage_env.scenario import Scenario, warnings
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.room import Room
 from uas_coverage_env.uas_coverage_v0 import parallel_env

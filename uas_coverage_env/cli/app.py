@@ -44,12 +44,7 @@ COMMANDS = (
         "compare:compare",
         "Fly every planner on every scenario with every seed, and compare them.",
     ),
-    CommandEntry(
-        "demonstrate",
-        at(f"{_CLI}.demonstrate:demonstrate_command"),
-        "Fly missions and keep observations and what was done, for imitation.",
-    ),
-    CommandEntry(
+    _ours(
         "score",
         "score:score_command",
         "Fly the missions of a level and print the scores (docs/levels.md).",

@@ -12,11 +12,12 @@ from rich.progress import Progress as ProgressBar
 
 from uas_coverage_env.cli.options import (
     BackendOption,
+    DynamicsOption,
     JobsOption,
     OverwriteOption,
     command_line,
 )
-from uas_coverage_env.cli.output import console, one_line
+from uas_coverage_env.cli.output import console, warn
 from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_others
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.strict_toml import InputError
@@ -41,7 +42,6 @@ from uas_coverage_env.leaderboard.planner_specs import varied_keys
 from uas_coverage_env.leaderboard.publish import FRONT
 from uas_coverage_env.runner import Store, WorkerLostError, Workers, opened, rows_in
 from uas_coverage_env.scenario import Scenario, warnings
-from uas_coverage_env.simulation.world import DynamicsName
 
 _REFERENCE = "nearest-waypoint"
 _MOST_FLIGHTS = 1_000_000
@@ -61,7 +61,7 @@ Planners = Annotated[
     list[str],
     typer.Option(
         metavar="NAME,...",
-        help="Names (see `planners`) or MODULE:CLASS; LABEL=NAME adds one with other options.",
+        help="Names (see `planner list`) or MODULE:CLASS; LABEL=NAME adds one with other options.",
     ),
 ]
 Out = Annotated[Path, typer.Option(help="Directory of the sweep; resumed if it exists.")]
@@ -89,7 +89,6 @@ Reference = Annotated[
 Filter = Annotated[
     bool, typer.Option("--filter", help="Switch the safety filter on for all planners.")
 ]
-Plant = Annotated[Dynamics, typer.Option(help="The paper's linear model, or 6-DOF, exact power.")]
 Check = Annotated[
     bool,
     typer.Option(
@@ -123,7 +122,7 @@ def compare(
     vary: Vary = None,
     reference: Reference = None,
     safety_filter: Filter = False,
-    dynamics: Plant = "lpv",
+    dynamics: DynamicsOption = "lpv",
     check: Check = False,
     backend: BackendOption = "process",
     jobs: JobsOption = None,
@@ -181,8 +180,7 @@ def _entries(sweep: Sweep) -> list[Entry]:
             f"give fewer, at most {_MOST_FLIGHTS}"
         )
     for name, scenario in sweep.scenarios.items():
-        for warning in warnings(scenario):
-            sys.stderr.write(f"warning: {name}: {one_line(warning)}\n")
+        warn(f"{name}: {warning}" for warning in warnings(scenario))
     return list(sweep.entries())
 
 

@@ -11,6 +11,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.leaderboard import SCORES, leaderboard_figure, published, scores_of
+from uas_coverage_env.replay.figure_kinds import KINDS, figure_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,7 +14,6 @@ from uas_coverage_env.cli.options import PlaceOption, ReplaceFlightOption
 from uas_coverage_env.cli.output import console, warn
 from uas_coverage_env.cli.sorties import load_planned
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.directory import check_directory
 
 if TYPE_CHECKING:

@@ -1,16 +1,20 @@
-"""Options as they are typed: of planners, seeds, and of commands that fly many missions."""
+"""Options that several commands have, and commands whose options are the fields of a record."""
 
+import inspect
+import re
 import shlex
-from collections.abc import Container, Sequence
-from typing import Annotated
-
-import typer
+from collections.abc import Callable, Container, Sequence
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
 from uas_coverage_env.cli import completion
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.runner import Backend
+from uas_coverage_env.simulation.world import DynamicsName
+
+Asked, Made = TypeVar("Asked"), TypeVar("Made")
 
 LAST_SEED = 2**64 - 1
 """The largest seed of a flight."""
@@ -31,6 +35,45 @@ BackendOption = Annotated[
     ),
 ]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Delete the flights in --out.")]
+ScenarioArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="Name of a shipped scenario (see `scenario list`), `generated:SEED` or another that "
+        "`compare` takes, or a scenario file.",
+        autocompletion=completion.scenarios,
+    ),
+]
+PlannerOption = Annotated[
+    str,
+    typer.Option(
+        help="Name (see `planner list`), `policy:DIR`, or MODULE:CLASS of your own.",
+        autocompletion=completion.planners,
+    ),
+]
+PlannerOptions = Annotated[
+    list[str] | None,
+    typer.Option(metavar="KEY=VALUE", help="Option of the planner; may be repeated."),
+]
+SeedOption = Annotated[int, typer.Option(min=0, max=LAST_SEED, help="Seed of the planner.")]
+DynamicsOption = Annotated[
+    DynamicsName, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
+]
+FilterOption = Annotated[bool, typer.Option("--filter", help="Switch the safety filter on.")]
+FlightDirectory = Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")]
+SecondFlight = Annotated[
+    Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")
+]
+ReplaceFlightOption = Annotated[
+    bool, typer.Option("--overwrite", help="Replace the flight in --out.")
+]
+ReplaceFileOption = Annotated[
+    bool, typer.Option("--overwrite", help="Replace the file where it exists.")
+]
+PlaceOption = Annotated[
+    str | None,
+    typer.Option(metavar="LAT,LON", help="Of the origin, for a scenario without [place]."),
+]
 
 
 def command_line(context: typer.Context, leave_out: Container[str] = ()) -> str:
@@ -49,7 +92,6 @@ def command_line(context: typer.Context, leave_out: Container[str] = ()) -> str:
         for each in values:
             words += parameter.opts[-1:] if value is True else [parameter.opts[-1], str(each)]
     return shlex.join(words)
-
 
 
 def declared(command: Callable[[Asked], None]) -> Callable[..., None]:

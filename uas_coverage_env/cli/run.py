@@ -29,10 +29,12 @@ from uas_coverage_env.cli.output import DONE, FAILED, console, loaded
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.settings import from_settings
 from uas_coverage_env.cli.sorties import SUMMARY, keep_sorties
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Flight, PlannerError, fly_sorties, load_planner, rollout
+from uas_coverage_env.files.errors import InputError, PlannerError
+from uas_coverage_env.flight import Flight, Planner, load_planner, rollout
 from uas_coverage_env.flight.directory import check_directory
 from uas_coverage_env.flight.metrics import accomplished
+from uas_coverage_env.flight.sorties import fly_sorties
+from uas_coverage_env.interruptions import STOPPED
 from uas_coverage_env.scenario import Scenario
 
 

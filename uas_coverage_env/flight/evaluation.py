@@ -8,8 +8,7 @@ import numpy as np
 
 from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight.figures import NOTHING, ByName, Figure, computed, figures, rows_part
-from uas_coverage_env.flight.flight import Flight
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import Flight, unless_stopped
 from uas_coverage_env.flight.loop import rollout
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.flight.policy import as_planner

@@ -35,7 +35,7 @@ class Entry:
     scenario_sha256: str
     spec: PlannerSpec
     seed: int
-    dynamics: Dynamics = "lpv"
+    dynamics: DynamicsName = "lpv"
     safety_filter: bool | None = None
     return_mode: bool | None = None
     reward_weights: Mapping[str, float] = field(default_factory=dict)

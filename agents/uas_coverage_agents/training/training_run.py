@@ -21,7 +21,7 @@ from uas_coverage_agents.training.config import TrainingConfig
 from uas_coverage_agents.training.learner import Learner
 from uas_coverage_agents.training.learners import learner_of
 from uas_coverage_agents.training.scenarios import validation_scenarios
-from uas_coverage_agents.training.score import Validation, fly, score
+from uas_coverage_agents.training.score import Validation, fly, score_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario
 
