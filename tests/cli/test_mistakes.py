@@ -94,7 +94,7 @@ def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
         (["run", "village", "--steps", "many"], "--steps"),
         (["run", "village", "--seed", "-1"], "--seed"),
         (["run", "village", "--seed", str(SEEDS)], "--seed"),
-        (["front", "village", "--seed", str(SEEDS), "--out", "front"], "--seed"),
+        (["planner", "demonstrate", "village", "--seed", str(SEEDS), "--out", "shown"], "--seed"),
         (["train", "ppo", "--seed", str(2**32)], "--seed"),
         (["run", "village", "--speed", "9"], "--speed"),
         (["run"], "SCENARIO"),

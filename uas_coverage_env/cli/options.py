@@ -14,7 +14,8 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.runner import Backend
 from uas_coverage_env.simulation.world import DynamicsName
 
-Asked, Made = TypeVar("Asked"), TypeVar("Made")
+Asked = TypeVar("Asked")
+Made = TypeVar("Made")
 
 LAST_SEED = 2**64 - 1
 """The largest seed of a flight."""

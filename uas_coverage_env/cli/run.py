@@ -116,20 +116,14 @@ def run(asked: Asked) -> None:
     command = _Run(asked, planner, directory, screen)
     try:
         with compiling_for_flight(planner, quiet=screen.quiet):
-            if asked.sorties is None:
-                flight = command.fly(mission)
-                keep_flight(flight, directory, overwrite=asked.overwrite)
-            else:
-                chain = fly_sorties(mission, command.fly, asked.sorties)
-                code = keep_sorties(screen, chain, directory, overwrite=asked.overwrite)
+            flight = command.fly_and_keep(mission) if asked.sorties is None else None
+            code = command.fly_sorties(mission, asked.sorties) if asked.sorties else DONE
     finally:
         if not any(directory.iterdir()):
             directory.rmdir()
-    if asked.sorties is None:
+    if flight is not None:
         command.report(flight)
         code = _exit_code(flight, asked.steps)
-    elif asked.as_json:
-        typer.echo((directory / SUMMARY).read_text(), nl=False)
     command.end(stopped=code == STOPPED)
     raise typer.Exit(code)
 
@@ -189,6 +183,20 @@ class _Run:
                     raise
                 self.trouble.append(error)
                 return error.flight
+
+    def fly_and_keep(self, scenario: Scenario) -> Flight:
+        """Fly one mission."""
+        flight = self.fly(scenario)
+        keep_flight(flight, self.directory, overwrite=self.asked.overwrite)
+        return flight
+
+    def fly_sorties(self, scenario: Scenario, most: int) -> int:
+        """Fly sortie after sortie, and say what came of them; returns the exit code."""
+        chain = fly_sorties(scenario, self.fly, most)
+        code = keep_sorties(self.screen, chain, self.directory, overwrite=self.asked.overwrite)
+        if self.asked.as_json:
+            typer.echo((self.directory / SUMMARY).read_text(), nl=False)
+        return code
 
     def report(self, flight: Flight) -> None:
         """Say what came of the flight."""
