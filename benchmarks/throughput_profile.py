@@ -16,10 +16,13 @@ from rich.table import Table
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.views import lane_view, rows_view, slice_view
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.act import acting_of, write_commands
 from uas_coverage_env.env.actions.velocity import VELOCITY
-from uas_coverage_env.env.kernel import Rules, step_learners
-from uas_coverage_env.env.memory import SCRATCH, Learners, Scratch
+from uas_coverage_env.env.batch.pool import learners_of, tables_at
+from uas_coverage_env.env.episode.act import acting_of, write_commands
+from uas_coverage_env.env.episode.memory import SCRATCH, Learners, Scratch
+from uas_coverage_env.env.episode.observe import observe_one, observing_of
+from uas_coverage_env.env.episode.pay import compute_rewards, paying_of
+from uas_coverage_env.env.episode.step import Rules, step_learners
 from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE
 from uas_coverage_env.env.observation.block import firsts_of
 from uas_coverage_env.env.observation.moving_obstacles import write_moving_obstacles
@@ -27,9 +30,6 @@ from uas_coverage_env.env.observation.nearest import nearest_waypoints
 from uas_coverage_env.env.observation.others import write_others
 from uas_coverage_env.env.observation.surroundings import write_surroundings
 from uas_coverage_env.env.observation.waypoints import write_waypoints
-from uas_coverage_env.env.observe import observe_one, observing_of
-from uas_coverage_env.env.pool import learners_of, tables_at
-from uas_coverage_env.env.reward_kernel import compute_rewards, paying_of
 from uas_coverage_env.env.rewards import REWARD
 from uas_coverage_env.simulation import advance
 from uas_coverage_env.simulation.pool import arena_of, state_of

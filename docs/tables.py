@@ -25,6 +25,7 @@ from gymnasium import spaces
 from uas_coverage_env import load_scenario, uas_coverage_v0
 from uas_coverage_env.env import CoverageParallelEnv, CoverageSwarmEnv, CoverageVectorEnv
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.observation import (
     OBSERVATION,
     OBSERVATION_SIZE,
@@ -33,9 +34,8 @@ from uas_coverage_env.env.observation import (
     layout_table,
     local,
 )
+from uas_coverage_env.env.rendering.screen import RENDER_MODES
 from uas_coverage_env.env.rewards import rewards_table
-from uas_coverage_env.env.screen import RENDER_MODES
-from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight import Why
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.scenario.events import EVENT_KINDS

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from uas_coverage_env.env.cuda import CudaMissions
-from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.memory import REWARD
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.episode import Episode
+from uas_coverage_env.env.episode.memory import REWARD
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.gpu.missions import CudaMissions
 from uas_coverage_env.mission import MissionBrief
 
 SEED, N_LANES = 7, 2

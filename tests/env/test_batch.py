@@ -7,10 +7,10 @@ from gymnasium.error import ResetNeeded
 from practice_grounds import practice_ground, with_roles
 
 from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
-from uas_coverage_env.env.batch_kernel import ABSENT, drawn
-from uas_coverage_env.env.memory import CONTACT, ENERGY, FIRST_TERM, LIMITS, STATUS
+from uas_coverage_env.env.batch.kernel import ABSENT, drawn
+from uas_coverage_env.env.episode.memory import CONTACT, ENERGY, FIRST_TERM, LIMITS, STATUS
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.rewards import REWARD_TERMS
-from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world import FLYING, LOST, build_arena

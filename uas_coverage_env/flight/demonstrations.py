@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
-from uas_coverage_env.env.observer import Observer
+from uas_coverage_env.env.policy.observer import Observer
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight.loop import Progress, rollout
 from uas_coverage_env.flight.planner import Planner

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import interpreted
 from uas_coverage_env.entities.outcome import FAULT, NONE
-from uas_coverage_env.env.meter import RewardMeter
+from uas_coverage_env.env.policy.meter import RewardMeter
 from uas_coverage_env.features.event import OfUas
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.flight.record import (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
-from uas_coverage_env.env.meter import RewardMeter
+from uas_coverage_env.env.policy.meter import RewardMeter
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.features import Feature
 from uas_coverage_env.features.of_scenario import features_of

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.cockpit import Cockpit
-from uas_coverage_env.env.interface import shown
+from uas_coverage_env.env.api.forms import shown
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.policy.cockpit import Cockpit
 from uas_coverage_env.flight.planner import Assistants
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.world import Command, SwarmState

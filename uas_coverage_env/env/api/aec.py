@@ -1,0 +1,91 @@
+"""The multi-agent environment in turns: one agent acts after the other (PettingZoo AEC)."""
+
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pettingzoo import AECEnv
+from pettingzoo.utils import BaseWrapper, OrderEnforcingWrapper
+from pettingzoo.utils.conversions import parallel_to_aec_wrapper
+
+from uas_coverage_env.env.api.parallel import CoverageParallelEnv
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import ScenarioLike
+from uas_coverage_env.world import Command, SwarmState
+
+
+class InTurns(parallel_to_aec_wrapper[str, NDArray[np.float32], Any]):
+    """PettingZoo's form in turns, with the spaces of the environment as they are.
+
+    PettingZoo makes new mappings and warns; libraries read them all the same.
+    """
+
+    @property
+    def observation_spaces(self) -> dict[str, Any]:
+        """See `CoverageParallelEnv.observation_spaces`."""
+        return self.env.observation_spaces
+
+    @property
+    def action_spaces(self) -> dict[str, Any]:
+        """See `CoverageParallelEnv.action_spaces`."""
+        return self.env.action_spaces
+
+
+class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
+    """Refuses an invalid action when it is given, not when the last agent has acted.
+
+    It stands where PettingZoo's own environments have `ClipOutOfBoundsWrapper`, which accepts
+    infinity and prints; finite numbers out of bounds are clipped by the environment itself.
+    """
+
+    def step(self, action: Any) -> None:
+        """Take the turn of `agent_selection`; what one that has ended is asked is ignored.
+
+        Raises:
+            ValueError: The action is invalid; names agent and value, and nothing has changed.
+        """
+        agent = self.agent_selection
+        if self.agents and (self.terminations[agent] or self.truncations[agent]):
+            action = None  # as PettingZoo wants it
+        elif self.agents:
+            self._parallel.check_action(agent, action)
+        super().step(action)
+
+    @property
+    def brief(self) -> MissionBrief:
+        """See `CoverageParallelEnv.brief`."""
+        return self._parallel.brief
+
+    def swarm_state(self) -> SwarmState:
+        """See `CoverageParallelEnv.swarm_state`: the same for all agents of a round."""
+        return self._parallel.swarm_state()
+
+    def action_of(self, agent: str, command: Command, *, clip: bool = False) -> Any:
+        """See `CoverageParallelEnv.action_of`."""
+        return self._parallel.action_of(agent, command, clip=clip)
+
+    @property
+    def _parallel(self) -> CoverageParallelEnv:
+        return cast(CoverageParallelEnv, self.unwrapped)
+
+
+def raw_env(
+    scenario: ScenarioLike = "village", **settings: Any
+) -> AECEnv[str, NDArray[np.float32], Any]:
+    """The environment in turns, without checks of its own.
+
+    Args:
+        scenario: See `CoverageParallelEnv`.
+        **settings: See `CoverageParallelEnv`.
+    """
+    return OrderEnforcingWrapper(InTurns(CoverageParallelEnv(scenario, **settings)))
+
+
+def env(scenario: ScenarioLike = "village", **settings: Any) -> ChecksAtOnce:
+    """The environment in turns; an invalid action is refused at once.
+
+    Args:
+        scenario: See `CoverageParallelEnv`.
+        **settings: See `CoverageParallelEnv`.
+    """
+    return ChecksAtOnce(raw_env(scenario, **settings))
