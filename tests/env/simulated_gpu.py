@@ -18,10 +18,10 @@ import own_disturbances_on_gpu
 import scenes_on_gpu
 
 from uas_coverage_env.env.episode.episode import Episode
-from uas_coverage_env.env.episode.memory import CONTACT, LIMITS, REWARD
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.gpu import missions as missions_on_gpu
 from uas_coverage_env.env.gpu.missions import CudaMissions
+from uas_coverage_env.env.report import CONTACT, LIMITS, REWARD
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.vehicle import limit_names
@@ -38,7 +38,7 @@ def compare(ground, ask=None, **settings):
         **settings: Of both.
     """
     missions = CudaMissions(N_LANES, ground, **settings)
-    episodes = [Episode(ground, MissionSettings(**settings)) for _ in range(N_LANES)]
+    episodes = [Episode(ground, MissionSettings.of(settings)) for _ in range(N_LANES)]
     size = episodes[0].actions.size
     for episode in episodes:
         episode.reset()

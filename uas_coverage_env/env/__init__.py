@@ -23,7 +23,7 @@ from uas_coverage_env.env.observation import (
     observation_bounds,
     observation_columns,
 )
-from uas_coverage_env.env.policy.observer import Observer
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm, rewards_table
 from uas_coverage_env.registration import GYMNASIUM_ID, PETTINGZOO_ID, register_environments
 
@@ -45,9 +45,9 @@ __all__ = [
     "CoverageSwarmEnv",
     "CoverageVectorEnv",
     "Feature",
+    "MissionInterface",
     "MissionSettings",
     "ObservationBlock",
-    "Observer",
     "RewardTerm",
     "ScenarioPool",
     "env",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
-from uas_coverage_env.env.policy.observer import Observer
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight.loop import Progress, rollout
 from uas_coverage_env.flight.planner import Planner
@@ -120,7 +120,7 @@ def demonstrate(scenario: Scenario, planner: Planner | str, seed: int = 0) -> De
         InputError: Unknown planner, or it refuses the scenario.
         PlannerError: The planner raised an exception, or gave commands that cannot be flown.
     """
-    observer = Observer(MissionBrief.of(scenario))
+    observer = MissionInterface(MissionBrief.of(scenario))
     seen: list[tuple[SwarmState, NDArray[np.float32], NDArray[np.int64]]] = []
 
     def look(progress: Progress) -> None:

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env.versions import V0
 from uas_coverage_env.flight import Episode, Planner, Policy, as_planner, evaluate
 from uas_coverage_env.leaderboard.statistics import Estimate, estimate
 from uas_coverage_env.scenario import Scenario
@@ -214,7 +215,7 @@ def _flown(
     settings = task.settings(**chosen)
     flies = planner
     if planner == RANDOM:
-        space = actions_of(task.action, scenario).space()
+        space = actions_of(V0.kind_of(task.action), scenario).space()
         space.seed(seed)
         flies = as_planner(lambda seen: space.sample(), **settings)
     (episode,) = evaluate(flies, scenario, seeds=[seed], swarm_of=swarm_of, **settings).episodes

@@ -14,10 +14,10 @@ from uas_coverage_env.env.api.documentation import with_tables
 from uas_coverage_env.env.api.forms import LastKnown, observation_space, shown
 from uas_coverage_env.env.episode.express import action_of
 from uas_coverage_env.env.episode.global_state import global_space
-from uas_coverage_env.env.episode.memory import REWARD, STATUS
 from uas_coverage_env.env.episode.sequence import MissionSequence
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
+from uas_coverage_env.env.report import REWARD, STATUS
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
@@ -158,7 +158,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
     @property
     def max_cycles(self) -> int:
         """Steps after which the episode is cut; to set it ends the mission: reset before a step."""
-        return self._episode.max_cycles
+        return self._episode.max_steps
 
     @max_cycles.setter
     def max_cycles(self, steps: int) -> None:
@@ -246,7 +246,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         report = episode.step()
 
         observation, amounts, told = episode.observation, episode.amounts, episode.infos
-        over = episode.steps >= episode.max_cycles
+        over = episode.steps >= episode.max_steps
         observations: Observations = {}
         rewards: dict[str, float] = {}
         terminations: dict[str, bool] = {}

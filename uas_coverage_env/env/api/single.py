@@ -16,11 +16,11 @@ from uas_coverage_env.env.api.forms import observation_space, shown
 from uas_coverage_env.env.api.spec import plain_spec
 from uas_coverage_env.env.episode.express import joint_action_of
 from uas_coverage_env.env.episode.infos import absent, flat
-from uas_coverage_env.env.episode.memory import COVERED, ENERGY, FIRST_TERM, STATUS
 from uas_coverage_env.env.episode.sequence import MissionSequence
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
+from uas_coverage_env.env.report import COVERED, ENERGY, FIRST_TERM, STATUS
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
@@ -102,8 +102,8 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        fixed = self._missions.source.fixed or self._episode.settings.max_cycles is not None
-        self._spec = plain_spec(spec, self._episode.max_cycles if fixed else None)
+        fixed = self._missions.source.fixed or self._episode.settings.max_steps is not None
+        self._spec = plain_spec(spec, self._episode.max_steps if fixed else None)
 
     @property
     def scenario(self) -> Scenario:
@@ -150,7 +150,7 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         report = episode.step()
         told = self._told(report)
         flies = any(row[STATUS] in (FLYING, SWAPPING) for row in report)
-        truncated = flies and episode.steps >= episode.max_cycles
+        truncated = flies and episode.steps >= episode.max_steps
         if self.render_mode is not None:
             self._see()
         reward = reduce(add, told["reward_terms"].values())
@@ -233,7 +233,7 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
             for i, (name, row) in enumerate(zip(episode.names, report, strict=True))
         }
         for name in self._missions.source.names[len(uas) :]:
-            uas[name] = absent(uas[episode.names[0]])
+            uas[name] = absent(uas[episode.names[0]], episode.settings.version.infos)
         told: dict[str, Any] = {
             "reward_terms": dict(zip(episode.settings.term_names, sums[FIRST_TERM:], strict=True)),
             "covered": report[0][COVERED],

@@ -21,17 +21,10 @@ from uas_coverage_env.env.batch.memory import (
     SWARM_REWARD,
 )
 from uas_coverage_env.env.episode.infos import flat
-from uas_coverage_env.env.episode.memory import (
-    CONTACT,
-    CONTACT_WITH,
-    FILTERED,
-    LIMITS,
-    RETURNING,
-    STATUS,
-)
 from uas_coverage_env.env.episode.sequence import check_options
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, offered
 from uas_coverage_env.env.rendering.tiles import BATCH_RENDER_MODES, Tiles
+from uas_coverage_env.env.report import CONTACT, CONTACT_WITH, FILTERED, LIMITS, RETURNING, STATUS
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import ABSENT, Command
 
@@ -167,7 +160,7 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         limits = {scenario.max_steps for scenario in self._batch.pool.scenarios}
-        fixed = self._batch.settings.max_cycles is not None or not self._batch.draws
+        fixed = self._batch.settings.max_steps is not None or not self._batch.draws
         self._spec = plain_spec(spec, limits.pop() if fixed and len(limits) == 1 else None)
 
     @property

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numba
 import numpy as np
@@ -44,8 +44,9 @@ from uas_coverage_env.env.episode.express import Moment, joint_action_of
 from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Learners
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.pay import paying_of
-from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings
 from uas_coverage_env.env.episode.step import ACCEPTED, Rules
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.simulation import swarm_state
@@ -77,6 +78,7 @@ class CoverageBatch:
         autoreset: A name of `AUTORESET`.
         threads: How many of numba's threads share the lanes, `NUMBA_NUM_THREADS` at most. They wait
             for work by spinning: on a busy machine set `OMP_WAIT_POLICY=passive`.
+        version: Of the environments.
         **settings: See `MissionSettings`.
 
     Attributes:
@@ -98,14 +100,15 @@ class CoverageBatch:
         *,
         autoreset: str = "next_step",
         threads: int = 1,
-        **settings: Any,
+        version: Version = V0,
+        **settings: Unpack[MissionKeywords],
     ) -> None:
         _check_count("num_envs", num_envs, _MOST_LANES)
         if threads != 1:
             _check_count("threads", threads, numba.get_num_threads())
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset is {autoreset!r}; it is one of {', '.join(AUTORESET)}")
-        self.settings = MissionSettings.of(settings)
+        self.settings = MissionSettings.of(settings, version)
         self.num_envs = int(num_envs)
         self.pool = pool_of(scenario, self.settings, self.num_envs)
         self.draws = isinstance(self.pool, DrawnPool)
@@ -118,7 +121,7 @@ class CoverageBatch:
         shape = (self.num_envs, self.n_uas, self.settings.observation_size)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
         self._threads = int(threads)
-        self._observing = observing_of(self.settings.observation)
+        self._observing = observing_of(self.settings.observation, version.observation)
         # else kernels do, which neither draw nor change scenes
         self._begins_here = self.draws or (self.pool.changes and self.autoreset == SAME_STEP)
         self._begun = False
@@ -429,16 +432,18 @@ class CoverageBatch:
         settings, kind = self.settings, self.actions.kind
         goes_to = kind.goes_to or self.pool.goes_home
         called = assistants(settings.return_mode, settings.safety_filter, goes_to=goes_to)
-        paying = paying_of(settings.reward, settings.weights)
+        version = settings.version
+        paying = paying_of(settings.reward, settings.weights, version.reward)
         nonlinear = settings.dynamics == "nonlinear"
         code = feature_code(
             self.pool.features, otherwise=nonlinear or self.pool.sizes["true vehicles"] > 0
         )
-        rules = Rules(acting_of(kind), nonlinear, called, code, paying, self._observing)
+        acting = acting_of(kind, version.actions)
+        rules = Rules(acting, nonlinear, called, code, paying, self._observing)
         # `_draw_next` comes between the end of a mission and the next
         begins_later = self._begins_here and self.autoreset == SAME_STEP
         autoreset = DISABLED if begins_later else self.autoreset
-        return BatchRules(rules, autoreset, lane_code(settings.observation_size))
+        return BatchRules(rules, autoreset, lane_code(version, settings.observation_size))
 
 
 def _check_count(name: str, count: Any, most: int) -> None:

@@ -1,7 +1,8 @@
 """One step of many missions, compiled: every lane is flown by `step_learners`, as a single one."""
 
 import math
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import get_thread_id, prange, types
@@ -17,7 +18,6 @@ from uas_coverage_env.compiled.kernels import (
 )
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view, rows_view
-from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.batch.memory import (
     DRAW,
     FLY,
@@ -40,22 +40,22 @@ from uas_coverage_env.env.batch.pool import (
     tables_at,
 )
 from uas_coverage_env.env.episode.act import acting_of, first_not_finite
-from uas_coverage_env.env.episode.memory import (
+from uas_coverage_env.env.episode.memory import SCRATCH
+from uas_coverage_env.env.episode.observe import observing_of
+from uas_coverage_env.env.episode.pay import paying_of
+from uas_coverage_env.env.episode.step import ACCEPTED, Rules, step_learners_with
+from uas_coverage_env.env.observation import K_WAYPOINTS
+from uas_coverage_env.env.observation.nearest import NO_TARGET
+from uas_coverage_env.env.report import (
     CONTACT_WITH,
     COVERED,
     ENERGY,
     FIRST_TERM,
     REPORT_SIZE,
     REWARD,
-    SCRATCH,
     STATUS,
 )
-from uas_coverage_env.env.episode.observe import observing_of
-from uas_coverage_env.env.episode.pay import paying_of
-from uas_coverage_env.env.episode.step import ACCEPTED, Rules, step_learners
-from uas_coverage_env.env.observation import K_WAYPOINTS, OBSERVATION
-from uas_coverage_env.env.observation.nearest import NO_TARGET
-from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.simulation.points import begin_features
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
 from uas_coverage_env.world import ABSENT, FLYING, SWAPPING
@@ -236,7 +236,7 @@ class BatchRules(NamedTuple):
     autoreset: int
     """NEXT_STEP, SAME_STEP or DISABLED."""
     step_lane: int
-    """Address of `step_lane`, see `lane_code`."""
+    """Address of the step of a lane, see `lane_code`."""
 
 
 class _Given(NamedTuple):
@@ -249,10 +249,11 @@ class _Given(NamedTuple):
 
 def _example() -> _Given:
     pool = ScenarioPool("open_field")
-    paying = paying_of(DEFAULT_REWARD, np.zeros(len(DEFAULT_REWARD)))
-    acting = acting_of(VELOCITY)
+    paying = paying_of(V0.reward, np.zeros(len(V0.reward)), V0.reward)
+    acting = acting_of(V0.actions[0], V0.actions)
     none = np.zeros(0, np.int64)
-    rules = Rules(acting, False, none, none, paying, observing_of(OBSERVATION))
+    observing = observing_of(V0.observation, V0.observation)
+    rules = Rules(acting, False, none, none, paying, observing)
     return _Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
 
 
@@ -260,55 +261,59 @@ _HANDOVER = Handover(_example)
 _keep, _take = _HANDOVER.keep, _HANDOVER.take
 
 
-@kernel
-def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
+@cache
+def step_lane_with(version: Version) -> Any:
     """One lane of `step_batch`.
 
-    Args:
-        kept: `_Given`, handed over.
-        lane: Which.
-        order: What it does.
-        thread: Which thread flies it, from 0 on.
-        autoreset: As in `BatchRules`.
-        before: See `step_batch`.
-        observation: See `step_batch`; written.
-        width: V. To know it when this is compiled makes a step a tenth faster.
+    Returns:
+        `step_lane(kept, lane, order, thread, autoreset, before, observation, width)`: `kept` is
+        `_Given`, handed over; `order` what the lane does; `thread` which thread flies it, from 0
+        on; `width` is V: to know it when this is compiled makes a step a tenth faster. The rest is
+        as for `step_batch`.
     """
-    pool, missions, rules = _take(kept)
-    lanes = missions.lanes
-    if rarely(order == REST):
-        whole = (observation.shape[1], width)
-        _copy(rows_view(before, lane, whole), rows_view(observation, lane, whole))
-        return
-    begins = order != FLY
-    if rarely(begins):
-        lanes.terminated[lane] = False
-        lanes.truncated[lane] = False
-        for i in range(lanes.rewards.shape[1]):
-            lanes.rewards[lane, i] = 0.0
-    else:
-        s = lanes.scene[lane]
-        arena = arena_of(pool.arenas, s)
-        max_steps = arena.rules[0].max_steps
-        state = state_of(missions.worlds, lane, pool.arenas, s)
-        learners = learners_of(missions.learners, lane, pool.arenas, s)
-        n_uas = state.uas.shape[0]
-        rows = rows_view(observation, lane, (n_uas, width))
-        _fetch_ahead(state, learners, rows)
-        _keep_last_looks(missions.worlds, missions.settled, lane, n_uas, before, observation, width)
-        step_learners(
-            arena, state, tables_at(pool.tables, s), learners,
-            _scratch_of(missions.scratch, thread, pool.arenas, s), rules, False, rows,
-        )  # fmt: skip
-        over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
-        if over and autoreset == NEXT_STEP:
-            lanes.orders[lane] = DRAW
-        elif over and autoreset == SAME_STEP:
-            _keep_end(missions, lane, observation, width)
-            begins = True
-            order = DRAW
-    if rarely(begins):
-        _begin_lane(pool, missions, rules.code, lane, order, observation, width)
+    step_learners = step_learners_with(version)
+
+    @kernel
+    def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
+        pool, missions, rules = _take(kept)
+        lanes = missions.lanes
+        if rarely(order == REST):
+            whole = (observation.shape[1], width)
+            _copy(rows_view(before, lane, whole), rows_view(observation, lane, whole))
+            return
+        begins = order != FLY
+        if rarely(begins):
+            lanes.terminated[lane] = False
+            lanes.truncated[lane] = False
+            for i in range(lanes.rewards.shape[1]):
+                lanes.rewards[lane, i] = 0.0
+        else:
+            s = lanes.scene[lane]
+            arena = arena_of(pool.arenas, s)
+            max_steps = arena.rules[0].max_steps
+            state = state_of(missions.worlds, lane, pool.arenas, s)
+            learners = learners_of(missions.learners, lane, pool.arenas, s)
+            n_uas = state.uas.shape[0]
+            rows = rows_view(observation, lane, (n_uas, width))
+            _fetch_ahead(state, learners, rows)
+            _keep_last_looks(
+                missions.worlds, missions.settled, lane, n_uas, before, observation, width
+            )
+            step_learners(
+                arena, state, tables_at(pool.tables, s), learners,
+                _scratch_of(missions.scratch, thread, pool.arenas, s), rules, False, rows,
+            )  # fmt: skip
+            over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
+            if over and autoreset == NEXT_STEP:
+                lanes.orders[lane] = DRAW
+            elif over and autoreset == SAME_STEP:
+                _keep_end(missions, lane, observation, width)
+                begins = True
+                order = DRAW
+        if rarely(begins):
+            _begin_lane(pool, missions, rules.code, lane, order, observation, width)
+
+    return step_lane
 
 
 def _lane_types() -> tuple[types.Type, ...]:
@@ -320,15 +325,16 @@ _LANE = Signature("kept lane order thread autoreset before observation width", _
 _step_lane_at = _LANE.call
 
 
-def lane_code(width: int) -> int:
-    """Compile `step_lane`, or load it from the cache.
+def lane_code(version: Version, width: int) -> int:
+    """Compile the step of a lane, or load it from the cache.
 
     It takes ten seconds to compile, and is called at its address: once for all kernels below.
 
     Args:
+        version: Of the environment.
         width: Numbers of an observation.
     """
-    return _LANE.address_of(step_lane, width=width)
+    return _LANE.address_of(step_lane_with(version), width=width)
 
 
 @kernel

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.memory import Memory, Values
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.episode.memory import LEARNERS, REPORT_SIZE, SCRATCH, Learners, Scratch
+from uas_coverage_env.env.episode.memory import LEARNERS, SCRATCH, Learners, Scratch
 from uas_coverage_env.env.observation import K_WAYPOINTS
+from uas_coverage_env.env.report import REPORT_SIZE
 from uas_coverage_env.world import FLYING, WorldState
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)
@@ -36,7 +37,7 @@ class SubEnvironments(NamedTuple):
     """Index in the pool of the mission."""
     scene: Annotated[NDArray[np.int64], "L"]
     """Index in the pool of what it flies now: the mission, or its scene since that has changed."""
-    changes: Annotated[NDArray[np.int64], "L", "changes"]
+    changes: Annotated[NDArray[np.int64], "L", "changes", Values(-1, 2**62)]
     """What has changed the scene of the mission, in order, see `simulation.scenes`; then -1."""
     orders: Annotated[NDArray[np.int64], "L", Values(FLY, DRAW)]
     """What it does in the coming step: FLY, or DRAW after an end (NEXT_STEP)."""
@@ -105,6 +106,4 @@ def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missi
     seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)
     missions.worlds.uas["status"][:] = FLYING
     missions.lanes.seed[:] = seeds
-    missions.lanes.mission[:] = missions.lanes.changes[:] = -1
-    missions.lanes.orders[:] = FLY
     return missions

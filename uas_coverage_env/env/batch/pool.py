@@ -12,6 +12,7 @@ from uas_coverage_env.compiled.views import lane_view, pool_view
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.batch.slots import Slots
+from uas_coverage_env.env.episode.arrays import first_observation, learners_sizes, tables_of
 from uas_coverage_env.env.episode.memory import (
     FIRST_OBSERVATION,
     LEARNERS,
@@ -21,7 +22,6 @@ from uas_coverage_env.env.episode.memory import (
 )
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.env.episode.start import first_observation, learners_sizes, tables_of
 from uas_coverage_env.features.feature import Feature, fitted_to, in_slots
 from uas_coverage_env.scenario import Room, Scenario, loaded_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
@@ -133,14 +133,14 @@ class ScenarioPool:
         worlds = pool_worlds(
             self.scenarios, measured_m=MEASURED_M, slots=slots, judges_wrenches=True
         )
-        actions = [actions_of(settings.action, scenario) for scenario in self.scenarios]
+        actions = [actions_of(settings.kind, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
         tables = [
             tables_of(scenario, each.ranges)
             for scenario, each in zip(self.scenarios, actions, strict=True)
         ]
         own_sizes = learners_sizes(settings, self.actions.size)
-        observing = observing_of(settings.observation)
+        observing = observing_of(settings.observation, settings.version.observation)
         first = [
             first_observation(
                 ARENA.mission(worlds.arenas, s),
@@ -148,6 +148,7 @@ class ScenarioPool:
                 tables[s],
                 observing,
                 own_sizes,
+                settings.version,
             )
             for s in range(len(self.scenarios))
         ]

@@ -10,8 +10,8 @@ from uas_coverage_env.entities.state import STATE, WorldState
 from uas_coverage_env.env.batch.drawn import DrawnPool
 from uas_coverage_env.env.batch.memory import Missions
 from uas_coverage_env.env.batch.pool import ScenarioPool, scene_arrays
+from uas_coverage_env.env.episode.arrays import observe_scene
 from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Learners, Observing, Tables
-from uas_coverage_env.env.episode.start import observe_scene
 from uas_coverage_env.features.event import OfUas
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.scenes import carried_over, changes_due, scene_after
@@ -99,7 +99,9 @@ class SceneChanges:
             array[:] = each
         learners = LEARNERS.first_rows(lane.learners, sizes)
         observation = lane.observation[: sizes["U"]]
-        observe_scene(arena, state, tables, learners, self._observing, observation)
+        observe_scene(
+            arena, state, tables, learners, self._observing, observation, pool.settings.version
+        )
         return True
 
     def _after(

@@ -1,8 +1,9 @@
-"""Actions become commands: the usual kinds as one kernel, others at their address."""
+"""Actions become commands: the kinds of a version as one kernel, others at their address."""
 
 import math
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numba import from_dtype, types
@@ -13,11 +14,7 @@ from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.entities.commands import CLIMB, GO_TO, HOME, VELOCITY
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, ActionKind
-from uas_coverage_env.env.actions.acceleration import write as write_acceleration
-from uas_coverage_env.env.actions.velocity import write as write_velocity
-from uas_coverage_env.env.actions.waypoint import write as write_waypoint
-from uas_coverage_env.env.actions.wrench import write as write_wrench
+from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.episode.memory import (
     ADDRESS,
     CHOOSES,
@@ -30,12 +27,13 @@ from uas_coverage_env.env.episode.memory import (
     WHICH,
     Acting,
 )
-from uas_coverage_env.files.blocks import numbered
 from uas_coverage_env.world import COMMAND_DTYPE, FLYING
 from uas_coverage_env.world.arena import ARENA
 
-_KIND = numbered(ACTION_NAMES, range(len(ACTIONS)))
-_OWN = len(ACTIONS)
+Kinds = tuple[ActionKind, ...]
+
+_OWN = -1
+"""Which kind it is, where it is none of the version."""
 
 
 @cache
@@ -52,21 +50,19 @@ _SIGNATURE = Signature("arena state tables learners i parameters values command"
 _write_command = _SIGNATURE.call
 
 
-def acting_of(kind: ActionKind, *, on_gpu: bool = False) -> Acting:
+def acting_of(kind: ActionKind, own: Kinds) -> Acting:
     """Compile the kernel of a kind, or load it from the cache.
 
     Args:
         kind: Of the actions.
-        on_gpu: Nothing is called at an address there, and so nothing has to be compiled here.
+        own: Those of the version.
 
     Raises:
         ValueError: It cannot be compiled.
     """
-    same = [kind.write is usual.write for usual in ACTIONS]
+    same = [kind.write is each.write for each in own]
     which = same.index(True) if any(same) else _OWN
-    address = 0
-    if which == _OWN and not on_gpu:
-        address = _SIGNATURE.address_of(kind.write)
+    address = 0 if which != _OWN else _SIGNATURE.address_of(kind.write)
     return Acting(
         call=np.array([which, address, kind.choices > 0, kind.goes_to], dtype=np.int64),
         parameters=np.array(kind.parameters, dtype=np.float64),
@@ -130,16 +126,26 @@ def begin_command(tables, learners, scratch, acting, i):
         scratch.values[i, k] = value
 
 
-@inlined_kernel
-def _write_as_usual(arena, state, tables, learners, which, i, parameters, values, command):
-    if which == _KIND.velocity:
-        write_velocity(arena, state, tables, learners, i, parameters, values, command)
-    elif which == _KIND.acceleration:
-        write_acceleration(arena, state, tables, learners, i, parameters, values, command)
-    elif which == _KIND.wrench:
-        write_wrench(arena, state, tables, learners, i, parameters, values, command)
-    else:
-        write_waypoint(arena, state, tables, learners, i, parameters, values, command)
+def _written(kinds: Kinds, which: int) -> Any:
+    """One kernel that writes the command of one of some kinds, which are numbered from a number."""
+    write = kinds[0].write
+    if len(kinds) == 1:
+
+        @inlined_kernel
+        def write_last(arena, state, tables, learners, kind, i, parameters, values, command):
+            write(arena, state, tables, learners, i, parameters, values, command)
+
+        return write_last
+    rest = _written(kinds[1:], which + 1)
+
+    @inlined_kernel
+    def write_one(arena, state, tables, learners, kind, i, parameters, values, command):
+        if kind == which:
+            write(arena, state, tables, learners, i, parameters, values, command)
+        else:
+            rest(arena, state, tables, learners, kind, i, parameters, values, command)
+
+    return write_one
 
 
 @kernel
@@ -158,36 +164,33 @@ def refuse_unflyable(arena, learners, acting, i, command):
         learners.asked[i, 0] = math.nan
 
 
-@inlined_kernel
-def write_commands(arena, state, tables, learners, scratch, acting, on_gpu):
-    """Turn what was asked into commands.
+@cache
+def write_commands_with(own: Kinds) -> Any:
+    """A kernel that turns actions into commands, of which some kinds are part.
 
-    Args:
-        arena: The arena.
-        state: The state of the world.
-        tables: `Tables`.
-        learners: `Learners` with the actions, all finite; targets are updated by the waypoint
-            action, and an action for which an own kind wrote what cannot be flown becomes NaN.
-        scratch: `Scratch`; commands and values are written.
-        acting: `Acting`.
-        on_gpu: None on the processor. A GPU calls nothing at an address: the commands of an own
-            kind are already written there.
+    Returns:
+        `write_commands(arena, state, tables, learners, scratch, acting)`: writes the commands and
+        the values of the actions, all of which are finite; targets are updated by the waypoint
+        action, and an action for which a kind of another origin wrote what cannot be flown becomes
+        NaN.
     """
-    which = acting.call[WHICH]
-    if on_gpu is not None and which == _OWN:
-        return
-    for i in range(scratch.commands.shape[0]):
-        begin_command(tables, learners, scratch, acting, i)
-        values = scratch.values[i]
-        command = scratch.commands[i]
-        if rarely(which == _OWN):
-            if on_gpu is None and state.uas[i].status == FLYING:
-                _write_command(
-                    acting.call[ADDRESS], arena, state, tables, learners, i, acting.parameters,
-                    values, command,
-                )  # fmt: skip
-                refuse_unflyable(arena, learners, acting, i, command)
-        else:
-            _write_as_usual(
-                arena, state, tables, learners, which, i, acting.parameters, values, command
-            )
+    write = _written(own, 0)
+
+    @inlined_kernel
+    def write_commands(arena, state, tables, learners, scratch, acting):
+        which = acting.call[WHICH]
+        for i in range(scratch.commands.shape[0]):
+            begin_command(tables, learners, scratch, acting, i)
+            values = scratch.values[i]
+            command = scratch.commands[i]
+            if rarely(which == _OWN):
+                if state.uas[i].status == FLYING:
+                    _write_command(
+                        acting.call[ADDRESS], arena, state, tables, learners, i,
+                        acting.parameters, values, command,
+                    )  # fmt: skip
+                    refuse_unflyable(arena, learners, acting, i, command)
+            else:
+                write(arena, state, tables, learners, which, i, acting.parameters, values, command)
+
+    return write_commands

@@ -9,25 +9,20 @@ from uas_coverage_env.autopilot import assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.episode.act import acting_of, is_own, refuse_what_it_wrote
+from uas_coverage_env.env.episode.arrays import arrays_of, report_start
 from uas_coverage_env.env.episode.express import Moment
 from uas_coverage_env.env.episode.global_state import global_state
 from uas_coverage_env.env.episode.infos import Infos
-from uas_coverage_env.env.episode.memory import EPISODE, LEARNERS, SCRATCH, Learners
-from uas_coverage_env.env.episode.observe import observe, observing_of
+from uas_coverage_env.env.episode.memory import EPISODE, Learners
+from uas_coverage_env.env.episode.observe import observe_with, observing_of
 from uas_coverage_env.env.episode.pay import paying_of
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.env.episode.start import (
-    first_learners,
-    learners_sizes,
-    tables_of,
-)
-from uas_coverage_env.env.episode.step import ACCEPTED, step_episode
+from uas_coverage_env.env.episode.step import ACCEPTED, step_episode_with
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.scenario import Room, Scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.world import SwarmState
-from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
 
 # numpy takes as long to find them as to use them
@@ -44,12 +39,12 @@ class Episode:
 
     Attributes:
         settings: As given.
-        scenario: The scenario flown, with `max_steps` as given by `settings.max_cycles`; where
+        scenario: The scenario flown, with `max_steps` as given by `settings.max_steps`; where
             events have changed the scene, as it is now.
         revisions: How often they have since t = 0.
         names: Of all UAS, in order.
         actions: The kind of action.
-        max_cycles: Steps after which the episode is cut.
+        max_steps: Steps after which the episode is cut.
         steps: Flown since t = 0.
         tables: What does not change during a mission.
         asked: (U, size) the actions of the coming step, to be written before it.
@@ -62,11 +57,10 @@ class Episode:
     def __init__(
         self, scenario: Scenario, settings: MissionSettings, room: Room | None = None
     ) -> None:
-        # at most 29 attributes: with more, Python takes twice as long for each
         scenario = settings.limited(scenario)
         self.settings = settings
         self._room = room or Room.of(scenario)
-        self.actions = actions_of(settings.action, scenario)
+        self.actions = actions_of(settings.kind, scenario)
         self._world = World(
             scenario,
             dynamics=settings.dynamics,
@@ -77,8 +71,7 @@ class Episode:
             judges_wrenches=True,
         )
         self.names = self._world.names
-        self.max_cycles = scenario.max_steps
-        self._sizes = learners_sizes(settings, self.actions.size)
+        self.max_steps = scenario.max_steps
         self._lay_out()
         self._observation_shape = (len(self.names), settings.observation_size)
         self.observation = np.zeros(self._observation_shape, np.float32)
@@ -91,10 +84,9 @@ class Episode:
         """Make the arrays whose sizes are those of the scene."""
         world = self._world
         self.scenario, self.revisions = world.known, world.revisions
-        self.tables = tables_of(self.scenario, self.actions.ranges)
-        sizes = ARENA.sizes_of(world.arena, self._sizes)
-        self._learners = LEARNERS.zeros(sizes)
-        self._scratch = SCRATCH.zeros(sizes)
+        _, self.tables, self._learners, self._scratch = arrays_of(
+            world.arena, self.scenario, self.settings, self.actions
+        )
 
     def _see_anew(self) -> None:
         """Go on in a scene that has changed: UAS are the same, waypoints keep their indices."""
@@ -112,10 +104,11 @@ class Episode:
         self.asked_rows = list(self.asked)
         self._report, self._paid = self._learners.report, self._learners.amounts
         self.infos = Infos(self.settings, self._learners, self._scratch)
-        self._acting = acting_of(kind)
+        version = self.settings.version
+        self._acting = acting_of(kind, version.actions)
         self._checks = is_own(self._acting)
-        self._paying = paying_of(self.settings.reward, self.settings.weights)
-        self._observing = observing_of(self.settings.observation)
+        self._paying = paying_of(self.settings.reward, self.settings.weights, version.reward)
+        self._observing = observing_of(self.settings.observation, version.observation)
         addresses = EPISODE.addresses_of(
             world.arena, world.state, self.tables, self._learners, self._scratch,
             self._acting, self._paying, self._observing,
@@ -132,7 +125,7 @@ class Episode:
         seen = self.observation
         # to assign a record field by field takes ten times as long
         self._scratch_bytes = [array.view(np.uint8) for array in self._scratch]
-        self._step = machine_code(step_episode, (*self._given, False, seen, seen))
+        self._step = machine_code(step_episode_with(version), (*self._given, False, seen, seen))
 
     def __getstate__(self) -> dict[str, Any]:
         # neither machine code nor addresses and views travel
@@ -168,9 +161,7 @@ class Episode:
 
     def _look_first(self) -> tuple[Learners, NDArray[np.float32]]:
         """What missions begin with, always the same; kept."""
-        first = first_learners(self._world.arena, self._world.state, self._sizes)
-        for array, start in zip(self._learners, first, strict=True):
-            array[:] = start
+        report_start(self._world.state, self._learners)
         self.observation = np.zeros(self._observation_shape, np.float32)
         self._look()
         self._first = (
@@ -240,7 +231,8 @@ class Episode:
         own = np.zeros((len(self.names), OWN.size), np.float32)
         observes = np.ones(len(self.names), dtype=np.bool_)
         arrays = (world.arena, world.state.as_observed(), self.tables, self._learners)
-        observe(*arrays, observing_of([OWN]), observes, own)
+        blocks = self.settings.version.observation
+        observe_with(blocks)(*arrays, observing_of([OWN], blocks), observes, own)
         return own
 
     @property

@@ -5,26 +5,15 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.memory import Memory, Values
+from uas_coverage_env.compiled.memory import Memory, Values, record_dtype
 from uas_coverage_env.compiled.views import Layout
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.observation.nearest import N_AROUND, NEIGHBOURS_DTYPE, NO_TARGET
+from uas_coverage_env.env.observation.notes import NOTES_DTYPE
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS, SCALES_DTYPE
+from uas_coverage_env.env.report import REPORT_SIZE
 from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE
 from uas_coverage_env.world.arena import ARENA
-
-CONTACT, CONTACT_WITH, LIMITS, STATUS, FILTERED, RETURNING, COVERED = range(7)
-"""Columns of a report: outcome of the step (LIMITS is a mask, see `vehicle.LIMIT_NAMES`), and how
-many waypoints the swarm has covered so far. Whole numbers, as Python is given them: to convert them
-one by one takes a tenth of a step."""
-
-REPORT_SIZE = COVERED + 1
-
-ENERGY, REWARD, FIRST_TERM = range(3)
-"""Columns of the amounts: energy drawn since t = 0 [Wh], the reward, and from FIRST_TERM on its
-weighted terms. The reward is their sum in their order (Python's own `sum` rounds in another way
-since 3.12)."""
-
 
 LOWEST, MIDDLE, HIGHEST = range(3)
 """Columns of the ranges: what -1, 0 and 1 mean for a number of an action."""
@@ -33,11 +22,19 @@ WHICH, ADDRESS, CHOOSES, GOES_TO = range(4)
 """Columns of the call of an action: which kind it is, the address of its kernel, whether it is a
 choice, and whether it goes to places (see `act`)."""
 
-TERM_ADDRESS, TERM, TERM_FIRST, TERM_PARAMETERS = range(4)
-"""Columns of the call of a term: address, which it is, first parameter, and how many."""
-
-BLOCK_ADDRESS, BLOCK_COLUMN, BLOCK_SIZE, BLOCK_FIRST, BLOCK_PARAMETERS = range(5)
-"""Columns of the call of a block: address, first column, size, first parameter, and how many."""
+CALL_DTYPE = record_dtype(
+    [
+        # where its kernel lies
+        ("address", "i8"),
+        # first number that it writes, and how many
+        ("column", "i8"),
+        ("size", "i8"),
+        # first parameter that it is handed, and how many
+        ("first", "i8"),
+        ("parameters", "i8"),
+    ]
+)
+"""The call of a block of an observation, or of a term of a reward, at its address."""
 
 
 class Tables(NamedTuple):
@@ -61,8 +58,10 @@ class Learners(NamedTuple):
     """The open waypoints in the order of the latest observation; -1 where there are no more."""
     around: Annotated[NDArray[np.float32], "W", N_AROUND]
     """What is open around each waypoint, see `write_around`."""
+    notes: Annotated[NDArray[np.void], NOTES_DTYPE, "U"]
+    """What blocks of the observation have in common, see `ObservationBlock.needs`."""
     report: Annotated[NDArray[np.int64], "U", REPORT_SIZE]
-    """Of the latest step: the columns named above."""
+    """Of the latest step, see `env.report`."""
     amounts: Annotated[NDArray[np.float64], "U", "P"]
     """Of the latest step: likewise, P = FIRST_TERM + R."""
 
@@ -95,10 +94,10 @@ class Paying(NamedTuple):
     """The R terms of a reward, for kernels."""
 
     weights: Annotated[NDArray[np.float64], "R"]
-    begins_as_usual: Annotated[NDArray[np.bool_], 1]
-    """The terms of `REWARD` come first: they are part of the step."""
-    calls: Annotated[NDArray[np.int64], "reward calls", TERM_PARAMETERS + 1]
-    """Of each other term, see `TERM_ADDRESS`."""
+    begins_as_version: Annotated[NDArray[np.bool_], 1]
+    """The terms of the version come first: they are part of the step."""
+    calls: Annotated[NDArray[np.void], CALL_DTYPE, "reward calls"]
+    """Of each other term."""
     parameters: Annotated[NDArray[np.float64], "reward parameters"]
     """Of all of them."""
 
@@ -106,10 +105,10 @@ class Paying(NamedTuple):
 class Observing(NamedTuple):
     """The blocks of an observation, for kernels."""
 
-    begins_as_usual: Annotated[NDArray[np.bool_], 1]
-    """The blocks of `OBSERVATION` come first: they are part of the step."""
-    calls: Annotated[NDArray[np.int64], "observation calls", BLOCK_PARAMETERS + 1]
-    """Of each other block, see `BLOCK_ADDRESS`."""
+    begins_as_version: Annotated[NDArray[np.bool_], 1]
+    """The blocks of the version come first: they are part of the step."""
+    calls: Annotated[NDArray[np.void], CALL_DTYPE, "observation calls"]
+    """Of each other block."""
     parameters: Annotated[NDArray[np.float64], "observation parameters"]
     """Of all of them."""
 

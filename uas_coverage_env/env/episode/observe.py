@@ -1,39 +1,22 @@
-"""The observations of all UAS: the default blocks as one kernel, others at their address."""
+"""The observations of all UAS: the blocks of a version as one kernel, others at their address."""
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
-import numpy as np
 from numba import types
 
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.episode.memory import (
-    BLOCK_ADDRESS,
-    BLOCK_COLUMN,
-    BLOCK_FIRST,
-    BLOCK_PARAMETERS,
-    BLOCK_SIZE,
-    LEARNERS,
-    TABLES,
-    Observing,
-)
-from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
-from uas_coverage_env.env.observation.block import firsts_of
-from uas_coverage_env.env.observation.home import write_home
-from uas_coverage_env.env.observation.moving_obstacles import write_moving_obstacles
+from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Observing
+from uas_coverage_env.env.episode.parts import handed_over
+from uas_coverage_env.env.observation import ObservationBlock
 from uas_coverage_env.env.observation.nearest import nearest_waypoints
-from uas_coverage_env.env.observation.others import write_others
-from uas_coverage_env.env.observation.own import write_own
-from uas_coverage_env.env.observation.remaining import write_remaining
-from uas_coverage_env.env.observation.surroundings import write_surroundings
-from uas_coverage_env.env.observation.waypoints import write_waypoints
 from uas_coverage_env.world.arena import ARENA
 
-_AT = firsts_of(OBSERVATION)
-_SIZE = type(_AT)(*(block.size for block in OBSERVATION))
+Blocks = tuple[ObservationBlock, ...]
 
 
 @cache
@@ -49,92 +32,135 @@ _SIGNATURE = Signature("arena state tables learners i parameters row", _types)
 _write_block = _SIGNATURE.call
 
 
-def observing_of(blocks: Sequence[ObservationBlock]) -> Observing:
+def observing_of(blocks: Sequence[ObservationBlock], own: Blocks) -> Observing:
     """Compile the blocks, or load them from the cache.
 
     Args:
         blocks: Of an observation.
+        own: Of the version.
 
     Raises:
         ValueError: A block cannot be compiled.
     """
-    blocks = tuple(blocks)
-    begins_as_usual = blocks[: len(OBSERVATION)] == OBSERVATION
-    calls = []
-    parameters: list[float] = []
-    column = 0
-    for k, block in enumerate(blocks):
-        if not begins_as_usual or k >= len(OBSERVATION):
-            address = _SIGNATURE.address_of(block.write)
-            calls.append((address, column, block.size, len(parameters), len(block.parameters)))
-            parameters.extend(block.parameters)
-        column += block.size
-    return Observing(
-        begins_as_usual=np.array([begins_as_usual]),
-        calls=np.array(calls, dtype=np.int64).reshape(-1, BLOCK_PARAMETERS + 1),
-        parameters=np.array(parameters, dtype=np.float64),
-    )
+    return Observing(*handed_over(blocks, own, _address_of))
 
 
-@inlined_kernel
-def _observe_as_usual(arena, state, tables, learners, i, row):
-    """Write the blocks of `OBSERVATION`; what two of them need is computed once."""
-    home_dod = write_home(arena, state, i, slice_view(row, _AT.home, _SIZE.home))
-    open_share = write_remaining(arena, state, i, slice_view(row, _AT.remaining, _SIZE.remaining))
-    write_own(arena, state, tables, i, home_dod, open_share, slice_view(row, _AT.own, _SIZE.own))
-    write_surroundings(arena, state, i, slice_view(row, _AT.surroundings, _SIZE.surroundings))
-    write_waypoints(
-        arena, state, tables, learners, i, slice_view(row, _AT.waypoints, _SIZE.waypoints)
-    )
-    write_others(arena, state, tables, i, slice_view(row, _AT.others, _SIZE.others))
-    write_moving_obstacles(
-        arena, state, tables, i, slice_view(row, _AT.moving_obstacles, _SIZE.moving_obstacles)
-    )
+def _address_of(block: ObservationBlock) -> int:
+    write = _with_notes(block.write, block.needs) if block.needs else block.write
+    return _SIGNATURE.address_of(write)
 
 
-@inlined_kernel
-def observe_one(arena, state, tables, learners, observing, i, row, on_gpu):
-    """Write the observation of UAS i, and the waypoints that it chooses among.
+@cache
+def _with_notes(write: Any, needs: tuple[Any, ...]) -> Any:
+    """The kernel of a block after those that it needs."""
+    note = _noted(needs)
+
+    @kernel
+    def write_with_notes(arena, state, tables, learners, i, parameters, row):
+        note(arena, state, tables, learners, i)
+        write(arena, state, tables, learners, i, parameters, row)
+
+    return write_with_notes
+
+
+def _noted(needs: Sequence[Any]) -> Any:
+    """One kernel that calls others in turn."""
+    if not needs:
+
+        @inlined_kernel
+        def note_nothing(arena, state, tables, learners, i):
+            pass
+
+        return note_nothing
+    note, rest = needs[0], _noted(needs[1:])
+
+    @inlined_kernel
+    def note_both(arena, state, tables, learners, i):
+        note(arena, state, tables, learners, i)
+        rest(arena, state, tables, learners, i)
+
+    return note_both
+
+
+def _written(blocks: Blocks, column: int, first: int) -> Any:
+    """One kernel that writes blocks in turn, from a column and a parameter on."""
+    if not blocks:
+
+        @inlined_kernel
+        def write_nothing(arena, state, tables, learners, parameters, i, row):
+            pass
+
+        return write_nothing
+    write, size, n = blocks[0].write, blocks[0].size, len(blocks[0].parameters)
+    rest = _written(blocks[1:], column + size, first + n)
+
+    @inlined_kernel
+    def write_both(arena, state, tables, learners, parameters, i, row):
+        write(
+            arena, state, tables, learners, i,
+            slice_view(parameters, first, n), slice_view(row, column, size),
+        )  # fmt: skip
+        rest(arena, state, tables, learners, parameters, i, row)
+
+    return write_both
+
+
+@cache
+def observe_one_with(own: Blocks, *, calls: bool = True) -> Any:
+    """A kernel that observes, of which some blocks are part.
 
     Args:
-        arena: The arena.
-        state: The state of the world.
-        tables: `Tables`.
-        learners: `Learners`; candidates are written.
-        observing: `Observing`.
-        i: Which.
-        row: (V,) float32; written.
-        on_gpu: None on the processor, see `pay`.
+        own: These; each note that they need is taken once.
+        calls: Whether it can call others at their address, which a GPU cannot.
+
+    Returns:
+        `observe_one(arena, state, tables, learners, observing, i, row)`: writes the observation of
+        UAS i into its row (V,) of float32, and the waypoints that it chooses among.
     """
-    nearest_waypoints(arena, state, i, learners.candidates[i])
-    if on_gpu is not None:
-        _observe_as_usual(arena, state, tables, learners, i, row)
-    else:
-        if observing.begins_as_usual[0]:
-            _observe_as_usual(arena, state, tables, learners, i, row)
+    note = _noted(tuple(dict.fromkeys(note for block in own for note in block.needs)))
+    write = _written(own, 0, 0)
+
+    @inlined_kernel
+    def observe_own(arena, state, tables, learners, observing, i, row):
+        nearest_waypoints(arena, state, i, learners.candidates[i])
+        note(arena, state, tables, learners, i)
+        write(arena, state, tables, learners, observing.parameters, i, row)
+
+    if not calls:
+        return observe_own
+
+    @inlined_kernel
+    def observe_one(arena, state, tables, learners, observing, i, row):
+        nearest_waypoints(arena, state, i, learners.candidates[i])
+        if observing.begins_as_version[0]:
+            note(arena, state, tables, learners, i)
+            write(arena, state, tables, learners, observing.parameters, i, row)
         if rarely(observing.calls.shape[0] > 0):
             for b in range(observing.calls.shape[0]):
                 call = observing.calls[b]
                 _write_block(
-                    call[BLOCK_ADDRESS], arena, state, tables, learners, i,
-                    slice_view(observing.parameters, call[BLOCK_FIRST], call[BLOCK_PARAMETERS]),
-                    slice_view(row, call[BLOCK_COLUMN], call[BLOCK_SIZE]),
+                    call.address, arena, state, tables, learners, i,
+                    slice_view(observing.parameters, call.first, call.parameters),
+                    slice_view(row, call.column, call.size),
                 )  # fmt: skip
 
+    return observe_one
 
-@kernel
-def observe(arena, state, tables, learners, observing, observes, observation):
-    """Write the observations of those UAS that are to observe; the others' stay.
 
-    Args:
-        arena: The arena.
-        state: The state of the world.
-        tables: `Tables`.
-        learners: `Learners`; candidates are written.
-        observing: See `observe_one`.
-        observes: (U,) which.
-        observation: (U, V) float32; written.
+@cache
+def observe_with(own: Blocks) -> Any:
+    """A kernel that observes for many, of which some blocks are part.
+
+    Returns:
+        `observe(arena, state, tables, learners, observing, observes, observation)`: writes the
+        rows of `observation` (U, V) of those UAS for which `observes` (U,) is set.
     """
-    for i in range(state.uas.shape[0]):
-        if observes[i]:
-            observe_one(arena, state, tables, learners, observing, i, observation[i], None)
+    observe_one = observe_one_with(own)
+
+    @kernel
+    def observe(arena, state, tables, learners, observing, observes, observation):
+        for i in range(state.uas.shape[0]):
+            if observes[i]:
+                observe_one(arena, state, tables, learners, observing, i, observation[i])
+
+    return observe

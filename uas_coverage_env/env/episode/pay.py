@@ -1,7 +1,8 @@
-"""The rewards of all UAS, compiled: the default terms as one kernel, others at their address."""
+"""The rewards of all UAS: the terms of a version as one kernel, others at their address."""
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -11,23 +12,13 @@ from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.episode.memory import (
-    FIRST_TERM,
-    LEARNERS,
-    SCRATCH,
-    TABLES,
-    TERM,
-    TERM_ADDRESS,
-    TERM_FIRST,
-    TERM_PARAMETERS,
-    Paying,
-)
-from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm
-from uas_coverage_env.env.rewards import terms as default
-from uas_coverage_env.files.blocks import numbered
+from uas_coverage_env.env.episode.memory import LEARNERS, SCRATCH, TABLES, Paying
+from uas_coverage_env.env.episode.parts import handed_over
+from uas_coverage_env.env.report import FIRST_TERM
+from uas_coverage_env.env.rewards import RewardTerm
 from uas_coverage_env.world.arena import ARENA
 
-_AT = numbered(REWARD_TERMS, range(len(REWARD)))
+Terms = tuple[RewardTerm, ...]
 
 
 @cache
@@ -45,84 +36,89 @@ _SIGNATURE = Signature(
 _value_of = _SIGNATURE.call
 
 
-def paying_of(terms: Sequence[RewardTerm], weights: NDArray[np.float64]) -> Paying:
+def paying_of(terms: Sequence[RewardTerm], weights: NDArray[np.float64], own: Terms) -> Paying:
     """Compile the terms, or load them from the cache.
 
     Args:
         terms: Of a reward.
         weights: (R,) theirs.
+        own: Of the version.
 
     Raises:
         ValueError: A term cannot be compiled.
     """
-    same = [term.value is usual.value for term, usual in zip(terms, REWARD, strict=False)]
-    begins_as_usual = len(same) == len(REWARD) and all(same)
-    calls = []
-    parameters: list[float] = []
-    for k, term in enumerate(terms):
-        if not begins_as_usual or k >= len(REWARD):
-            address = _SIGNATURE.address_of(term.value)
-            calls.append((address, k, len(parameters), len(term.parameters)))
-            parameters.extend(term.parameters)
-    return Paying(
-        weights=weights,
-        begins_as_usual=np.array([begins_as_usual]),
-        calls=np.array(calls, dtype=np.int64).reshape(-1, TERM_PARAMETERS + 1),
-        parameters=np.array(parameters, dtype=np.float64),
-    )
+    parts = handed_over(terms, own, lambda term: _SIGNATURE.address_of(term.value))
+    return Paying(weights, *parts)
 
 
-@inlined_kernel
-def _pay_as_usual(arena, state, tables, learners, scratch, i):
-    """Write the terms of `REWARD`, not yet weighted."""
-    paid = learners.amounts[i]
-    row = slice_view(paid, FIRST_TERM, paid.shape[0] - FIRST_TERM)
-    none = slice_view(paid, 0, 0)
-    row[_AT.coverage] = default.coverage(arena, state, tables, learners, scratch, i, none)
-    row[_AT.team_coverage] = default.team_coverage(arena, state, tables, learners, scratch, i, none)
-    row[_AT.energy] = default.energy(arena, state, tables, learners, scratch, i, none)
-    row[_AT.violation] = default.violation(arena, state, tables, learners, scratch, i, none)
-    row[_AT.home] = default.home(arena, state, tables, learners, scratch, i, none)
-    row[_AT.stranded] = default.stranded(arena, state, tables, learners, scratch, i, none)
-    row[_AT.filter] = default.filter_change(arena, state, tables, learners, scratch, i, none)
-    row[_AT.time] = default.time(arena, state, tables, learners, scratch, i, none)
+def _paid(terms: Terms, term: int, first: int) -> Any:
+    """One kernel that writes the values of terms in turn, from a column and a parameter on."""
+    if not terms:
+
+        @inlined_kernel
+        def pay_nothing(arena, state, tables, learners, scratch, parameters, i):
+            pass
+
+        return pay_nothing
+    value, n = terms[0].value, len(terms[0].parameters)
+    rest = _paid(terms[1:], term + 1, first + n)
+
+    @inlined_kernel
+    def pay_both(arena, state, tables, learners, scratch, parameters, i):
+        learners.amounts[i, FIRST_TERM + term] = value(
+            arena, state, tables, learners, scratch, i, slice_view(parameters, first, n)
+        )
+        rest(arena, state, tables, learners, scratch, parameters, i)
+
+    return pay_both
 
 
-@inlined_kernel
-def compute_rewards(arena, state, tables, learners, scratch, paying, on_gpu):
-    """Write the weighted terms of every UAS that flew in this step, or has now landed for good.
-
-    Those of the others are zero.
+@cache
+def compute_rewards_with(own: Terms, *, calls: bool = True) -> Any:
+    """A kernel that computes rewards, of which some terms are part.
 
     Args:
-        arena: The arena.
-        state: The state of the world after the step.
-        tables: `Tables`.
-        learners: `Learners`; the terms of its amounts are written.
-        scratch: `Scratch`.
-        paying: `Paying`.
-        on_gpu: None on the processor. A GPU calls nothing at an address: it knows `REWARD` alone.
+        own: These.
+        calls: Whether it can call others at their address, which a GPU cannot.
+
+    Returns:
+        `compute_rewards(arena, state, tables, learners, scratch, paying)`: writes the weighted
+        terms of every UAS that flew in this step, or has now landed for good; those of the others
+        are zero.
     """
-    amounts = learners.amounts
-    n_terms = paying.weights.shape[0]
-    for i in range(amounts.shape[0]):
-        if not (scratch.outcome[i].flew or scratch.outcome[i].landed):
+    pay = _paid(own, 0, 0)
+
+    @inlined_kernel
+    def pay_own(arena, state, tables, learners, scratch, paying, i):
+        pay(arena, state, tables, learners, scratch, paying.parameters, i)
+
+    @inlined_kernel
+    def pay_all(arena, state, tables, learners, scratch, paying, i):
+        if paying.begins_as_version[0]:
+            pay(arena, state, tables, learners, scratch, paying.parameters, i)
+        if rarely(paying.calls.shape[0] > 0):
+            for t in range(paying.calls.shape[0]):
+                call = paying.calls[t]
+                learners.amounts[i, FIRST_TERM + call.column] = _value_of(
+                    call.address, arena, state, tables, learners, scratch, i,
+                    slice_view(paying.parameters, call.first, call.parameters),
+                )  # fmt: skip
+
+    pay_terms = pay_all if calls else pay_own
+
+    @inlined_kernel
+    def compute_rewards(arena, state, tables, learners, scratch, paying):
+        amounts = learners.amounts
+        n_terms = paying.weights.shape[0]
+        for i in range(amounts.shape[0]):
+            if not (scratch.outcome[i].flew or scratch.outcome[i].landed):
+                for term in range(n_terms):
+                    amounts[i, FIRST_TERM + term] = 0.0
+                continue
+            pay_terms(arena, state, tables, learners, scratch, paying, i)
             for term in range(n_terms):
-                amounts[i, FIRST_TERM + term] = 0.0
-            continue
-        if on_gpu is not None:
-            _pay_as_usual(arena, state, tables, learners, scratch, i)
-        else:
-            if paying.begins_as_usual[0]:
-                _pay_as_usual(arena, state, tables, learners, scratch, i)
-            if rarely(paying.calls.shape[0] > 0):
-                for t in range(paying.calls.shape[0]):
-                    call = paying.calls[t]
-                    amounts[i, FIRST_TERM + call[TERM]] = _value_of(
-                        call[TERM_ADDRESS], arena, state, tables, learners, scratch, i,
-                        slice_view(paying.parameters, call[TERM_FIRST], call[TERM_PARAMETERS]),
-                    )  # fmt: skip
-        for term in range(n_terms):
-            # adding zero makes -0.0 a plain zero
-            amount = amounts[i, FIRST_TERM + term]
-            amounts[i, FIRST_TERM + term] = amount * paying.weights[term] + 0.0
+                # adding zero makes -0.0 a plain zero
+                amount = amounts[i, FIRST_TERM + term]
+                amounts[i, FIRST_TERM + term] = amount * paying.weights[term] + 0.0
+
+    return compute_rewards

@@ -80,7 +80,7 @@ class MissionSequence:
     def cut_after(self, steps: int) -> Episode:
         """Give missions another time limit; the one that is flown is over."""
         # all anew: return mode and observations reckon with it from the start
-        self._settings = replace(self._settings, max_cycles=steps)
+        self._settings = replace(self._settings, max_steps=steps)
         self.episode = self._made()
         return self.episode
 

@@ -1,16 +1,16 @@
 """How missions are flown and paid: what every environment can be told, in one record."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, get_args
+from dataclasses import dataclass
+from typing import Any, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions import ActionKind
-from uas_coverage_env.env.actions.kinds import kind_of
-from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock, observation_named
-from uas_coverage_env.env.rewards import REWARD, RewardTerm, weights_of
+from uas_coverage_env.env.observation import ObservationBlock
+from uas_coverage_env.env.rewards import RewardTerm, weights_of
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.features.feature import Feature, checked_features
 from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
@@ -29,6 +29,27 @@ class UnknownArgumentError(ValueError, TypeError):
     """
 
 
+class MissionKeywords(TypedDict, total=False):
+    """The keyword arguments of all environments, with their types: see `MissionSettings`."""
+
+    action: str | ActionKind
+    dynamics: Dynamics
+    return_mode: bool
+    safety_filter: bool
+    reward_weights: Mapping[str, float] | None
+    max_cycles: int | None
+    observation: str | tuple[ObservationBlock, ...] | None
+    reward: tuple[RewardTerm, ...] | None
+    disturbances: tuple[Feature, ...] | None
+    mask_in_observation: bool
+    images_apart: bool
+    flat_infos: bool | None
+
+
+_INSIDE = {"max_cycles": "max_steps"}
+"""Keyword arguments that bear the name which libraries have for them -> the name here."""
+
+
 @dataclass(frozen=True)
 class MissionSettings:
     """What the environments take as keyword arguments, whatever their interface.
@@ -39,10 +60,11 @@ class MissionSettings:
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.
         reward_weights: Mapping from reward term to weight; the other terms keep theirs.
-        max_cycles: Time limit of the mission in steps; None: the scenario's `max_steps`.
-        observation: Blocks that the observation is made of, see `ObservationBlock`; or the name of
-            an observation (`default`, `local`, `grid`).
-        reward: Terms that the reward is made of, see `RewardTerm`.
+        max_steps: Time limit of the mission, in the environments `max_cycles`; None: the
+            scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
         disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
             (): none.
         mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
@@ -52,7 +74,8 @@ class MissionSettings:
             uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
             that `Box`.
         flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
-            libraries that make an array of every info (TorchRL).
+            libraries that make an array of every info (TorchRL). None: as in the version.
+        version: Which version of the environments this is.
 
     Raises:
         ValueError: A value is none of what is allowed; says what is.
@@ -63,19 +86,23 @@ class MissionSettings:
     return_mode: bool = False
     safety_filter: bool = False
     reward_weights: Mapping[str, float] | None = None
-    max_cycles: int | None = None
-    observation: tuple[ObservationBlock, ...] = OBSERVATION
-    reward: tuple[RewardTerm, ...] = REWARD
+    max_steps: int | None = None
+    observation: Any = None
+    reward: Any = None
     disturbances: tuple[Feature, ...] | None = None
     mask_in_observation: bool = False
     images_apart: bool = False
-    flat_infos: bool = False
+    flat_infos: bool | None = None
+    version: Version = V0
 
     def __post_init__(self) -> None:
-        kind_of(self.action)
+        version = self.version
+        version.kind_of(self.action)
         if self.dynamics not in get_args(Dynamics):
             allowed = ", ".join(get_args(Dynamics))
             raise ValueError(f"dynamics is {self.dynamics!r}; it is one of {allowed}")
+        if self.flat_infos is None:
+            object.__setattr__(self, "flat_infos", version.flat_infos)
         for name in _SWITCHES:
             switch = getattr(self, name)
             if not isinstance(switch, bool | np.bool_):
@@ -86,49 +113,47 @@ class MissionSettings:
                 f"mask_in_observation is True, and action {self.kind.name!r} has no choices to "
                 f'mask; take action="waypoint", or leave it out'
             )
-        cycles = self.max_cycles
-        whole = isinstance(cycles, int | np.integer) and not isinstance(cycles, bool)
-        if cycles is not None and (not whole or not 1 <= cycles <= _LONGEST):
-            raise ValueError(f"max_cycles is {cycles!r}; give a whole number from 1 to {_LONGEST}")
-        object.__setattr__(
-            self,
-            "observation",
-            checked_blocks("observation", "blocks", self.observation, ObservationBlock),
-        )
-        if self.images_apart and not any(block.shape for block in self.observation):
+        steps = self.max_steps
+        whole = isinstance(steps, int | np.integer) and not isinstance(steps, bool)
+        if steps is not None and (not whole or not 1 <= steps <= _LONGEST):
+            raise ValueError(f"max_cycles is {steps!r}; give a whole number from 1 to {_LONGEST}")
+        blocks = version.blocks_of(self.observation)
+        blocks = checked_blocks("observation", "blocks", blocks, ObservationBlock)
+        object.__setattr__(self, "observation", blocks)
+        if self.images_apart and not any(block.shape for block in blocks):
             raise ValueError(
                 "images_apart is True, and no block of the observation is a picture; "
                 'take observation="grid", or leave it out'
             )
-        object.__setattr__(
-            self, "reward", checked_blocks("reward", "terms", self.reward, RewardTerm)
-        )
+        terms = version.reward if self.reward is None else self.reward
+        object.__setattr__(self, "reward", checked_blocks("reward", "terms", terms, RewardTerm))
         weights_of(self.reward, self.reward_weights)
         if self.disturbances is not None:
             object.__setattr__(self, "disturbances", checked_features(self.disturbances))
 
     @classmethod
-    def of(cls, given: Mapping[str, Any], beside: Sequence[str] = ()) -> "MissionSettings":
+    def of(
+        cls, given: Mapping[str, Any], version: Version = V0, beside: Sequence[str] = ()
+    ) -> "MissionSettings":
         """The settings of keyword arguments.
 
         Args:
-            given: Name -> value.
+            given: Name -> value, see `MissionKeywords`.
+            version: Of the environment.
             beside: Other keyword arguments of the function that takes them, for its error.
 
         Raises:
             ValueError: There is no such setting, or a value is none of what is allowed.
         """
-        known = [field.name for field in fields(cls)]
-        taken = ", ".join((*beside, *known))
+        known = tuple(MissionKeywords.__annotations__)
         for name in given:
             if name not in known:
+                taken = ", ".join((*beside, *known))
                 raise UnknownArgumentError(
                     f"unexpected keyword argument {name!r}; there are {taken}"
                 )
-        named = given.get("observation")
-        if isinstance(named, str):
-            given = {**given, "observation": observation_named(named)}
-        return cls(**given)
+        inside = {_INSIDE.get(name, name): value for name, value in given.items()}
+        return cls(**inside, version=version)
 
     @property
     def weights(self) -> NDArray[np.float64]:
@@ -153,7 +178,7 @@ class MissionSettings:
     @property
     def kind(self) -> ActionKind:
         """The kind of action."""
-        return kind_of(self.action)
+        return self.version.kind_of(self.action)
 
     @property
     def chooses(self) -> bool:
@@ -166,6 +191,6 @@ class MissionSettings:
 
     def limited(self, scenario: Scenario) -> Scenario:
         """The scenario with this time limit; return mode and the observed time know it."""
-        if self.max_cycles is None:
+        if self.max_steps is None:
             return scenario
-        return scenario.model_copy(update={"max_steps": int(self.max_cycles)})
+        return scenario.model_copy(update={"max_steps": int(self.max_steps)})

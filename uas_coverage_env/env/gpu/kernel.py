@@ -21,23 +21,20 @@ from uas_coverage_env.env.batch.pool import (
     learners_of,
     tables_at,
 )
-from uas_coverage_env.env.episode.act import (
-    begin_command,
-    first_not_finite,
-    refuse_unflyable,
-    write_commands,
-)
+from uas_coverage_env.env.episode.act import begin_command, first_not_finite, refuse_unflyable
 from uas_coverage_env.env.episode.memory import (
     FIRST_OBSERVATION,
     LEARNERS,
-    REWARD,
     SCRATCH,
-    STATUS,
     FirstObservation,
     Learners,
     Scratch,
 )
-from uas_coverage_env.env.episode.step import ACCEPTED, look_around, pay_step
+from uas_coverage_env.env.episode.observe import Blocks, observe_one_with
+from uas_coverage_env.env.episode.pay import Terms, compute_rewards_with
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.episode.step import ACCEPTED, look_around_with, pay_step_with
+from uas_coverage_env.env.report import REWARD, STATUS
 from uas_coverage_env.features.feature import Feature, Point
 from uas_coverage_env.simulation.flight import check_all, fly_still, move_all, write_all_inputs
 from uas_coverage_env.simulation.on_gpu import called_at, called_at_begin
@@ -138,51 +135,50 @@ def _flies_with(features: tuple[Feature, ...]) -> Any:
 
 
 @kernel
-def _decide(pool, acting, missions, lane):
-    """Begin a step with the commands of the actions."""
+def _decide(pool, missions, lane):
+    """Begin a step with the commands that are written already."""
     scene = missions.scene[lane, 0]
     state = state_of(missions.worlds, lane, pool.arenas, scene)
-    learners = learners_of(missions.learners, lane, pool.arenas, scene)
     scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
-    arena, tables = arena_of(pool.arenas, scene), tables_at(pool.tables, scene)
-    seen = as_observed(state)
-    write_commands(arena, seen, tables, learners, scratch, acting, True)
     begin_step(state, scratch.commands, scratch.outcome)
 
 
-@kernel
-def _finish(pool, paying, observing, missions, lane):
-    """Reward and observe a step that was flown."""
-    scene = missions.scene[lane, 0]
-    state = state_of(missions.worlds, lane, pool.arenas, scene)
-    learners = learners_of(missions.learners, lane, pool.arenas, scene)
-    scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
-    arena, tables = arena_of(pool.arenas, scene), tables_at(pool.tables, scene)
-    seen = _look_of(missions.first_observations, lane, pool.arenas, scene)
-    pay_step(arena, state, tables, learners, scratch, paying, True)
-    look_around(arena, state, tables, learners, scratch, observing, False, seen.observation, True)
-    flies = False
-    for i in range(state.uas.shape[0]):
-        missions.rewards[lane, i] = learners.amounts[i, REWARD]
-        missions.acted[lane] += scratch.outcome[i].flew
-        status = learners.report[i, STATUS]
-        flies = flies or status == FLYING
-        flies = flies or status == SWAPPING
-    missions.ended[lane] = not flies or state.step[0] >= arena.rules[0].max_steps
-    missions.due[lane] = _is_due(state)
+@cache
+def _finish_with(observation: Blocks, reward: Terms) -> Any:
+    """A function that rewards and observes a step that was flown."""
+    pay_step = pay_step_with(compute_rewards_with(reward, calls=False))
+    look_around = look_around_with(observe_one_with(observation, calls=False))
 
+    @kernel
+    def finish(pool, paying, observing, missions, lane):
+        """Reward and observe a step that was flown."""
+        scene = missions.scene[lane, 0]
+        state = state_of(missions.worlds, lane, pool.arenas, scene)
+        learners = learners_of(missions.learners, lane, pool.arenas, scene)
+        scratch = _scratch_of(missions.scratch, lane, pool.arenas, scene)
+        arena, tables = arena_of(pool.arenas, scene), tables_at(pool.tables, scene)
+        seen = _look_of(missions.first_observations, lane, pool.arenas, scene)
+        pay_step(arena, state, tables, learners, scratch, paying)
+        look_around(arena, state, tables, learners, scratch, observing, False, seen.observation)
+        flies = False
+        for i in range(state.uas.shape[0]):
+            missions.rewards[lane, i] = learners.amounts[i, REWARD]
+            missions.acted[lane] += scratch.outcome[i].flew
+            status = learners.report[i, STATUS]
+            flies = flies or status == FLYING
+            flies = flies or status == SWAPPING
+        missions.ended[lane] = not flies or state.step[0] >= arena.rules[0].max_steps
+        missions.due[lane] = _is_due(state)
 
-@kernel
-def _write_as_usual(pool, acting, missions, lane):
-    """The commands of the usual kinds of action are written by `write_commands`."""
+    return finish
 
 
 @cache
 def _write_with(write: Any) -> Any:
-    """A function that writes commands with the kernel of a kind of action of one's own."""
+    """A function that writes commands with the kernel of a kind of action."""
 
     @kernel
-    def write_own(pool, acting, missions, lane):
+    def write_commands(pool, acting, missions, lane):
         # before the step: an action that cannot be flown is refused as one that is not finite
         scene = missions.scene[lane, 0]
         arena = arena_of(pool.arenas, scene)
@@ -201,7 +197,7 @@ def _write_with(write: Any) -> Any:
                 write(arena, seen, tables, learners, i, acting.parameters, values, command)
                 refuse_unflyable(arena, learners, acting, i, command)
 
-    return write_own
+    return write_commands
 
 
 @cache  # to compile it again takes seconds
@@ -237,7 +233,7 @@ def _fly_with(features: tuple[Feature, ...], nonlinear: bool, has_true_vehicles:
 
 
 @cache
-def _step_of(write: Any, flies: Any, fly: Any) -> Any:
+def _step_of(write: Any, flies: Any, fly: Any, finish: Any) -> Any:
     """The step of all lanes, made of these functions."""
 
     @cuda.jit
@@ -246,28 +242,28 @@ def _step_of(write: Any, flies: Any, fly: Any) -> Any:
         if lane < missions.ended.shape[0]:
             write(pool, acting, missions, lane)
             if flies(pool, missions, lane):
-                _decide(pool, acting, missions, lane)
+                _decide(pool, missions, lane)
                 fly(pool, missions, lane)
-                _finish(pool, paying, observing, missions, lane)
+                finish(pool, paying, observing, missions, lane)
 
     return step
 
 
 def step_with(
-    write: Any, features: tuple[Feature, ...], nonlinear: bool, has_true_vehicles: bool
+    settings: MissionSettings, features: tuple[Feature, ...], has_true_vehicles: bool
 ) -> Any:
     """The step of all lanes, to be launched.
 
     Args:
-        write: The kernel of a kind of action of one's own; None: it is one of the package.
+        settings: How missions are flown and paid; all of its kernels are part of the step.
         features: What the mission has of what few missions have.
-        nonlinear: Whether the 6-DOF plant is flown.
         has_true_vehicles: Whether others are flown than are believed.
     """
     return _step_of(
-        _write_as_usual if write is None else _write_with(write),
+        _write_with(settings.kind.write),
         _flies_with(features),
-        _fly_with(features, nonlinear, has_true_vehicles),
+        _fly_with(features, settings.dynamics == "nonlinear", has_true_vehicles),
+        _finish_with(settings.observation, settings.reward),
     )
 
 

@@ -20,7 +20,7 @@ from uas_coverage_env.env.batch.checkpoint import checked
 from uas_coverage_env.env.batch.pool import MissionPool, ScenarioPool
 from uas_coverage_env.env.batch.scenes import SceneChanges, SceneLane, install_scenes
 from uas_coverage_env.env.batch.state_dict import check_like, check_values, fields_of, records_of
-from uas_coverage_env.env.episode.act import acting_of, is_own
+from uas_coverage_env.env.episode.act import acting_of
 from uas_coverage_env.env.episode.memory import TABLES
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.pay import paying_of
@@ -34,8 +34,6 @@ from uas_coverage_env.env.gpu.device import (
     write_lane,
 )
 from uas_coverage_env.env.gpu.kernel import Missions, new_missions, step_with
-from uas_coverage_env.env.observation import OBSERVATION
-from uas_coverage_env.env.rewards import REWARD as DEFAULT_REWARD
 from uas_coverage_env.scenario import Scenario, installed_families
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
@@ -95,24 +93,17 @@ class CudaMissions:
                 "actions that go to places (waypoint), return_mode and safety_filter do not run on "
                 "a GPU; take another action and leave both switches off"
             )
-        if given.observation != OBSERVATION or given.reward != DEFAULT_REWARD:
-            raise ValueError(
-                "on a GPU observation and reward are OBSERVATION and REWARD; leave them out"
-            )
         pool = ScenarioPool(scenario, given, lanes=num_envs)
         if goes_home(pool.scenarios[0]):
             raise ValueError(
                 f"scenario {pool.scenarios[0].name!r} has an event that sends UAS home, which does "
                 f'not run on a GPU; let them do another thing (then = "hover")'
             )
-        acting = acting_of(given.kind, on_gpu=True)
-        write_own = given.kind.write if is_own(acting) else None
-        self._launched = step_with(
-            write_own, pool.features, given.dynamics == "nonlinear",
-            pool.sizes["true vehicles"] > 0,
-        )  # fmt: skip
-        paying = paying_of(DEFAULT_REWARD, given.weights)
-        observing = observing_of(OBSERVATION)
+        self._launched = step_with(given, pool.features, pool.sizes["true vehicles"] > 0)
+        # all kernels are part of the step: a GPU calls nothing at an address
+        acting = acting_of(given.kind, (given.kind,))
+        paying = paying_of(given.reward, given.weights, given.reward)
+        observing = observing_of(given.observation, given.version.observation)
         self._pool = pool
         self._observing = observing
         self.missions: Missions = on_device(new_missions(pool, num_envs, seed))
@@ -121,7 +112,7 @@ class CudaMissions:
         self._arguments = (
             on_device(acting),
             on_device(paying),
-            on_device(observing),
+            on_device(observing_of(given.observation, given.observation)),
             self.missions,
         )
 
