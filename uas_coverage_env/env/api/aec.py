@@ -1,6 +1,6 @@
 """The multi-agent environment in turns: one agent acts after the other (PettingZoo AEC)."""
 
-from typing import Any, cast
+from typing import Any, Unpack, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,9 @@ from pettingzoo import AECEnv
 from pettingzoo.utils import BaseWrapper, OrderEnforcingWrapper
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
+from uas_coverage_env.env.api.documentation import takes_settings
 from uas_coverage_env.env.api.parallel import CoverageParallelEnv
+from uas_coverage_env.env.episode.settings import MissionKeywords
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import ScenarioLike
 from uas_coverage_env.world import Command, SwarmState
@@ -69,23 +71,76 @@ class ChecksAtOnce(BaseWrapper[str, NDArray[np.float32], Any]):
         return cast(CoverageParallelEnv, self.unwrapped)
 
 
+def in_turns(parallel: CoverageParallelEnv) -> AECEnv[str, NDArray[np.float32], Any]:
+    """An environment in turns, without checks of its own."""
+    return OrderEnforcingWrapper(InTurns(parallel))
+
+
+@takes_settings
 def raw_env(
-    scenario: ScenarioLike = "village", **settings: Any
+    scenario: ScenarioLike = "village",
+    *,
+    render_mode: str | None = None,
+    **settings: Unpack[MissionKeywords],
 ) -> AECEnv[str, NDArray[np.float32], Any]:
     """The environment in turns, without checks of its own.
 
     Args:
-        scenario: See `CoverageParallelEnv`.
-        **settings: See `CoverageParallelEnv`.
+        scenario: See `CoverageParallelEnv`; likewise the others.
+        render_mode: None, "rgb_array" or "human".
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL). None: as in the version.
     """
-    return OrderEnforcingWrapper(InTurns(CoverageParallelEnv(scenario, **settings)))
+    return in_turns(CoverageParallelEnv(scenario, render_mode=render_mode, **settings))
 
 
-def env(scenario: ScenarioLike = "village", **settings: Any) -> ChecksAtOnce:
+@takes_settings
+def env(
+    scenario: ScenarioLike = "village",
+    *,
+    render_mode: str | None = None,
+    **settings: Unpack[MissionKeywords],
+) -> ChecksAtOnce:
     """The environment in turns; an invalid action is refused at once.
 
     Args:
-        scenario: See `CoverageParallelEnv`.
-        **settings: See `CoverageParallelEnv`.
+        scenario: See `CoverageParallelEnv`; likewise the others.
+        render_mode: None, "rgb_array" or "human".
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL). None: as in the version.
     """
-    return ChecksAtOnce(raw_env(scenario, **settings))
+    return ChecksAtOnce(raw_env(scenario, render_mode=render_mode, **settings))

@@ -1,7 +1,7 @@
 """The multi-agent environment: one agent per UAS, all act at once (PettingZoo)."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import numpy as np
 from gymnasium import spaces
@@ -10,14 +10,15 @@ from gymnasium.utils import seeding
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from uas_coverage_env.env.api.documentation import with_tables
+from uas_coverage_env.env.api.documentation import takes_settings, with_tables
 from uas_coverage_env.env.api.forms import LastKnown, observation_space, shown
 from uas_coverage_env.env.episode.express import action_of
 from uas_coverage_env.env.episode.global_state import global_space
 from uas_coverage_env.env.episode.sequence import MissionSequence
-from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.report import REWARD, STATUS
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
@@ -81,15 +82,7 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         Numbers and arrays, each of the same kind and shape in every step. The last info of an agent
         that has ended is complete.
 
-        - `status` (`UasStatus`): 0 flying, 1 landed, 2 lost, 3 swapping its battery pack
-        - `contact` (`ContactKind`): what it was lost to; 0 nothing, 1 obstacle, 2 moving obstacle,
-          3 UAS, 4 geofence, 5 battery, 6 an event of the scenario, 7 limits, out of control
-        - `contact_with`: the index of that obstacle or UAS in the scenario, else -1
-        - `limits_exceeded`: limits of the vehicle that it exceeds, as a mask: bit k stands for
-          `vehicle.LIMIT_NAMES[k]`
-        - `returning`: whether it flies home
-        - `covered`: waypoints that the swarm has covered so far
-        - `energy_Wh`: energy drawn by this UAS so far
+        {infos}
         - `reward_terms`: a dictionary
         - `action_mask`: with the waypoint action
         - `filter`: with the safety filter, a dictionary of `changed`, and of the commands `asked`
@@ -112,7 +105,25 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
             data. To draw a scenario at each reset: the name of a family (`generated`), a
             `MissionSource`, or any function `generator(rng) -> Scenario`.
-        {settings}
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL). None: as in the version.
         render_mode: None, "rgb_array" (512 x 512 pixels) or "human" (a window, extra
             `human`: space pauses, right steps, escape closes it and the missions go on).
 
@@ -120,21 +131,23 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
     """
 
+    version: ClassVar[Version] = V0
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]
-        "name": "uas_coverage_v0",
+        "name": f"uas_coverage_{V0.name}",
         "render_modes": offered(RENDER_MODES),
         "render_fps": RENDER_FPS,
         "is_parallelizable": True,
     }
 
+    @takes_settings
     def __init__(
         self,
         scenario: ScenarioLike = "village",
         *,
         render_mode: str | None = None,
-        **settings: Any,
+        **settings: Unpack[MissionKeywords],
     ) -> None:
-        self._missions = MissionSequence(scenario, MissionSettings.of(settings))
+        self._missions = MissionSequence(scenario, MissionSettings.of(settings, self.version))
         self._episode = self._missions.episode
         self._screen = Screen(self._episode.scenario, render_mode)
         self.render_mode = render_mode

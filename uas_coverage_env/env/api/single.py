@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from functools import reduce
 from operator import add
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import gymnasium
 import numpy as np
@@ -11,16 +11,17 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.api.documentation import with_tables
+from uas_coverage_env.env.api.documentation import takes_settings, with_tables
 from uas_coverage_env.env.api.forms import observation_space, shown
 from uas_coverage_env.env.api.spec import plain_spec
 from uas_coverage_env.env.episode.express import joint_action_of
 from uas_coverage_env.env.episode.infos import absent, flat
 from uas_coverage_env.env.episode.sequence import MissionSequence
-from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.report import COVERED, ENERGY, FIRST_TERM, STATUS
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
@@ -66,27 +67,47 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
             data; or what draws a scenario at each reset: the name of a family (`generated`), a
             `MissionSource`, or any function `generator(rng) -> Scenario`.
-        {settings}
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL). None: as in the version.
         render_mode: None, "rgb_array" or "human", see `CoverageParallelEnv`.
 
     Version History:
         v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
     """
 
+    version: ClassVar[Version] = V0
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]
         "render_modes": offered(RENDER_MODES),
         "render_fps": RENDER_FPS,
     }
 
+    @takes_settings
     def __init__(
         self,
         scenario: ScenarioLike = "village",
         *,
         render_mode: str | None = None,
-        **settings: Any,
+        **settings: Unpack[MissionKeywords],
     ) -> None:
         self._spec: EnvSpec | None = None
-        self._missions = MissionSequence(scenario, MissionSettings.of(settings))
+        self._missions = MissionSequence(scenario, MissionSettings.of(settings, self.version))
         self._episode = self._missions.episode
         self._screen = Screen(self._episode.scenario, render_mode)
         self.render_mode = render_mode

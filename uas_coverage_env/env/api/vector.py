@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Unpack
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from uas_coverage_env.env.api.documentation import takes_settings
 from uas_coverage_env.env.api.forms import observation_space, shown
 from uas_coverage_env.env.api.spec import plain_spec
 from uas_coverage_env.env.batch.batch import CoverageBatch
@@ -22,9 +23,11 @@ from uas_coverage_env.env.batch.memory import (
 )
 from uas_coverage_env.env.episode.infos import flat
 from uas_coverage_env.env.episode.sequence import check_options
+from uas_coverage_env.env.episode.settings import MissionKeywords
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, offered
 from uas_coverage_env.env.rendering.tiles import BATCH_RENDER_MODES, Tiles
-from uas_coverage_env.env.report import CONTACT, CONTACT_WITH, FILTERED, LIMITS, RETURNING, STATUS
+from uas_coverage_env.env.report import FILTERED, STATUS
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import ABSENT, Command
 
@@ -92,18 +95,38 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         render_mode: None; "rgb_array": `render` returns a tuple of pictures, 512 x 512 pixels each,
             as Gymnasium's wrappers ask for; "rgb_array_tiled": one array (H, W, 3) that shows the
             first 16 missions side by side; "human": a window with these (extra `human`).
-        **settings: See `MissionSettings`.
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL). None: as in the version.
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
     """
 
+    version: ClassVar[Version] = V0
     metadata: dict[str, Any] = {  # noqa: RUF012  # as Gymnasium declares it
         "render_modes": offered(BATCH_RENDER_MODES),
         "render_fps": RENDER_FPS,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
+    @takes_settings
     def __init__(
         self,
         num_envs: int = 1,
@@ -114,7 +137,7 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         copy: bool = True,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
-        **settings: Any,
+        **settings: Unpack[MissionKeywords],
     ) -> None:
         try:
             mode = AutoresetMode(autoreset_mode)
@@ -132,6 +155,7 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
             scenario,
             autoreset=_MODES[mode],
             threads=threads,
+            version=self.version,
             **settings,
         )
         self.metadata = {**self.metadata, "autoreset_mode": mode}
@@ -160,7 +184,7 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         limits = {scenario.max_steps for scenario in self._batch.pool.scenarios}
-        fixed = self._batch.settings.max_steps is not None or not self._batch.draws
+        fixed = self._batch.settings.max_steps is not None or not self._batch.pool.draws
         self._spec = plain_spec(spec, limits.pop() if fixed and len(limits) == 1 else None)
 
     @property
@@ -335,18 +359,18 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         terms: dict[str, Any] = {}
         for column, name in enumerate(self._batch.settings.term_names, SWARM_FIRST_TERM):
             terms[name] = swarm[:, column]
-        status = report[:, :, STATUS].copy()
-        infos = {
+        absent = report[:, :, STATUS] == ABSENT
+        infos: dict[str, Any] = {
             "reward_terms": terms,
             "covered": swarm[:, SWARM_COVERED].astype(np.int64),
             "energy_Wh": swarm[:, SWARM_ENERGY],
             "scenario": self._batch.lanes.scenario * mask,
-            "status": status,
-            "contact": report[:, :, CONTACT].copy(),
-            "contact_with": np.where(status == ABSENT, -1, report[:, :, CONTACT_WITH]),
-            "limits_exceeded": report[:, :, LIMITS].copy(),
-            "returning": report[:, :, RETURNING] > 0,
         }
+        for field in self.version.infos:
+            if not (field.of_amounts or field.of_swarm):
+                column = report[:, :, field.column]
+                told = column > 0 if field.flag else column.copy()
+                infos[field.name] = np.where(absent, field.absent, told) if field.absent else told
         if self._batch.filters:
             infos["filtered"] = report[:, :, FILTERED] > 0
         if self._batch.chooses and not self._masks_seen:
@@ -383,3 +407,57 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         self._tiles.see(batch.lanes.mission.tolist(), batch.scenario_of, batch.worlds.x[:, :, :3])
         if self.render_mode == "human":
             self.render()
+
+
+@takes_settings
+def vector_env(
+    num_envs: int = 1,
+    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
+    *,
+    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    threads: int = 1,
+    copy: bool = True,
+    render_mode: str | None = None,
+    **settings: Unpack[MissionKeywords],
+) -> CoverageVectorEnv:
+    """Many missions at once; the same as `gymnasium.make_vec("UASCoverage-v0", num_envs)`.
+
+    Args:
+        num_envs: How many.
+        scenario: See `CoverageVectorEnv`; likewise the others.
+        autoreset_mode: An `AutoresetMode`, or its value.
+        threads: How many of numba's threads share the missions.
+        copy: Whether observations are arrays of their own.
+        render_mode: None, "rgb_array", "rgb_array_tiled" or "human".
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL). None: as in the version.
+
+    Raises:
+        ValueError: An argument is none of what is allowed; says what is.
+    """
+    return CoverageVectorEnv(
+        num_envs,
+        scenario,
+        autoreset_mode=autoreset_mode,
+        threads=threads,
+        copy=copy,
+        render_mode=render_mode,
+        **settings,
+    )

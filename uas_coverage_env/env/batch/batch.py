@@ -15,7 +15,7 @@ from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.actions.given import accept_of_lanes
 from uas_coverage_env.env.batch.checkpoint import checked
-from uas_coverage_env.env.batch.drawn import DrawnPool, pool_of
+from uas_coverage_env.env.batch.drawn import pool_of
 from uas_coverage_env.env.batch.kernel import (
     BatchRules,
     lane_code,
@@ -29,6 +29,7 @@ from uas_coverage_env.env.batch.memory import (
     NEXT_STEP,
     REST,
     SAME_STEP,
+    WAITS,
     SubEnvironments,
     new_missions,
 )
@@ -54,8 +55,14 @@ from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
 from uas_coverage_env.world.arena import ARENA
 
-AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
-"""When a mission that has ended begins anew."""
+AUTORESET = {
+    "next_step": NEXT_STEP,
+    "same_step": SAME_STEP,
+    "disabled": DISABLED,
+    "rest": WAITS,
+}
+"""When a mission that has ended begins anew; with `rest` not at all, so that each lane flies one
+mission and `(lanes.terminated | lanes.truncated).all()` says when all have ended."""
 
 _MOST_LANES = 2**20
 
@@ -79,7 +86,25 @@ class CoverageBatch:
         threads: How many of numba's threads share the lanes, `NUMBA_NUM_THREADS` at most. They wait
             for work by spinning: on a busy machine set `OMP_WAIT_POLICY=passive`.
         version: Of the environments.
-        **settings: See `MissionSettings`.
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL). None: as in the version.
 
     Attributes:
         settings: How missions are flown and paid.
@@ -111,7 +136,6 @@ class CoverageBatch:
         self.settings = MissionSettings.of(settings, version)
         self.num_envs = int(num_envs)
         self.pool = pool_of(scenario, self.settings, self.num_envs)
-        self.draws = isinstance(self.pool, DrawnPool)
         self.n_uas = self.pool.sizes["U"]
         self.actions = self.pool.actions
         self.chooses = self.settings.chooses
@@ -123,7 +147,7 @@ class CoverageBatch:
         self._threads = int(threads)
         self._observing = observing_of(self.settings.observation, version.observation)
         # else kernels do, which neither draw nor change scenes
-        self._begins_here = self.draws or (self.pool.changes and self.autoreset == SAME_STEP)
+        self._begins_here = self.pool.draws or (self.pool.changes and self.autoreset == SAME_STEP)
         self._begun = False
         self._kernel: Callable[..., int] | None = None
         self._rules: BatchRules | None = None
@@ -227,7 +251,7 @@ class CoverageBatch:
         chosen = self.pool.chosen(scenarios, self.num_envs)
         if seed is not None:
             self.seed(seed)
-        self._run(self._orders(mask, chosen))
+        self._run(self.pool.orders(mask, self.lanes, chosen))
         self._begun = True
         return self.observation
 
@@ -256,7 +280,7 @@ class CoverageBatch:
                 )
         accept_of_lanes(self.actions, actions, self.learners.asked)
         orders = lanes.orders.copy()
-        if self.draws:
+        if self.pool.draws:
             # what is drawn begins after the step of the others, which may still be refused
             refused = self._run(np.where(orders == DRAW, REST, orders))
         else:
@@ -285,8 +309,6 @@ class CoverageBatch:
         Raises:
             ValueError: A mission was given to `reset`, not drawn.
         """
-        if isinstance(self.pool, DrawnPool):
-            self.pool.check_drawn()
         return fields_of(self._changing())
 
     def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -300,8 +322,7 @@ class CoverageBatch:
         check_like(state, fields_of(own))
         state = records_of(state, own)
         drawn, changed = checked(self.pool, state)
-        if isinstance(self.pool, DrawnPool):
-            self.pool.install(drawn)
+        self.pool.install(drawn)
         for name, array in own.items():
             array[...] = state[name]
         install_scenes(self.pool, self.lanes.scenario, self.lanes.scene, changed)
@@ -316,9 +337,7 @@ class CoverageBatch:
         if not self.pool.changes:
             del arrays["changes"]
         arrays["observation"] = self.observation
-        if isinstance(self.pool, DrawnPool):
-            arrays["drawn_from"] = self.pool.drawn_from
-        return arrays
+        return {**arrays, **self.pool.kept()}
 
     def swarm_state(self, lane: int) -> SwarmState:
         """What a planner of this lane sees now, in arrays of their own."""
@@ -372,14 +391,6 @@ class CoverageBatch:
         """The scenario that a lane flies; where events have changed the scene, as it is now."""
         return self.pool.scene_of(int(self.lanes.scene[lane]))
 
-    def _orders(self, begins: NDArray[np.bool_], chosen: Any = None) -> NDArray[np.int64]:
-        """Begin missions in some lanes: those chosen, or drawn."""
-        if isinstance(self.pool, DrawnPool):
-            lanes = np.flatnonzero(begins)
-            self.pool.begin(lanes, self.lanes.seed, self.lanes.mission < 0, chosen)
-            chosen = np.arange(self.num_envs)
-        return np.where(begins, DRAW if chosen is None else chosen, REST)
-
     def _draw_next(self, begins: NDArray[np.bool_]) -> None:
         """Begin drawn missions, as the kernel begins those of a `ScenarioPool`."""
         lanes, final = self.lanes, self.missions.final
@@ -387,7 +398,7 @@ class CoverageBatch:
             begins = lanes.terminated | lanes.truncated
         if not begins.any():
             return
-        orders = self._orders(begins)
+        orders = self.pool.orders(begins, lanes, None)
         if self.autoreset != SAME_STEP:
             self._run(orders, in_place=True)
             return

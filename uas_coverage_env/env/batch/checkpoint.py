@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.batch.drawn import DrawnMission, DrawnPool
 from uas_coverage_env.env.batch.memory import LANES
-from uas_coverage_env.env.batch.pool import ScenarioPool
 from uas_coverage_env.env.batch.scenes import scenes_in
+from uas_coverage_env.env.batch.source import DrawnMission, LaneMissions
 from uas_coverage_env.env.batch.state_dict import check_values
 from uas_coverage_env.env.episode.memory import LEARNERS
 from uas_coverage_env.features.feature import fitted_to, memory_of
@@ -19,7 +18,7 @@ from uas_coverage_env.vehicle.record import COUNTS
 
 
 def checked(
-    pool: ScenarioPool | DrawnPool, state: Mapping[str, NDArray[Any]]
+    pool: LaneMissions, state: Mapping[str, NDArray[Any]]
 ) -> tuple[list[DrawnMission], dict[int, Scenario]]:
     """Look for values that no mission of a batch can have.
 
@@ -28,18 +27,17 @@ def checked(
         state: Its arrays by name, of the right shapes and dtypes.
 
     Returns:
-        The missions that were drawn, for `DrawnPool.install`; and the scenes that have changed,
+        The missions that were drawn, for `LaneMissions.install`; and the scenes that have changed,
         for `install_scenes`.
 
     Raises:
         ValueError: There are such values.
     """
-    scenarios, drawn = list(pool.scenarios), []
+    scenarios = list(pool.scenarios)
     begun = state["mission"] >= 0
-    if isinstance(pool, DrawnPool):
-        drawn = pool.redrawn(state["drawn_from"], begun)
-        for mission in drawn:
-            scenarios[mission.lane] = mission.scenario
+    drawn = pool.redrawn(state, begun)
+    for mission in drawn:
+        scenarios[mission.lane] = mission.scenario
     longest = max(pool.settings.limited(scenario).max_steps for scenario in scenarios)
     flown = state["scenario"].clip(0, len(scenarios) - 1)
     changed = {}
@@ -63,6 +61,5 @@ def checked(
         slots = fitted_to(pool.features, pool.settings.features_in(flies))
         kept = memory_of(slots, len(flies.uas), state["memory"][lane])
         check_values({f"memory[{lane}].{name}": records for name, records in kept.items()}, {})
-    if isinstance(pool, DrawnPool):
-        check_values(state, {"scenario": pool.slots_of(begun)})
+    check_values(state, pool.limits(begun))
     return drawn, changed

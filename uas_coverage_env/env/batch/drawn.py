@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from gymnasium.utils import seeding
@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.batch.pool import MissionPool, ScenarioPool
+from uas_coverage_env.env.batch.memory import REST, MissionPool, SubEnvironments
+from uas_coverage_env.env.batch.pool import ScenarioPool
 from uas_coverage_env.env.batch.slots import Slots
+from uas_coverage_env.env.batch.source import DrawnMission, LaneMissions
 from uas_coverage_env.env.batch.state_dict import check_values
 from uas_coverage_env.env.episode.memory import FIRST_OBSERVATION, LEARNERS, TABLES, Tables
 from uas_coverage_env.env.episode.settings import MissionSettings
@@ -47,12 +49,14 @@ class DrawnPool:
         features: One of each kind that there may be: of those in `source.examples`.
         goes_home: Whether an event may send a UAS home, in any of `source.examples`.
         changes: Whether the scene of any of `source.examples` may change.
+        draws: True: they are drawn in Python, one when it begins.
         drawn_from: (L, 6) states of the generators from which the missions now flown were drawn;
             zero where none was drawn.
     """
 
     def __init__(self, source: MissionSource, settings: MissionSettings, num_envs: int) -> None:
         self.settings = settings
+        self.draws = True
         self._source = source
         self.features, _ = in_slots([settings.features_in(each) for each in source.examples])
         self.goes_home = any(goes_home(scenario) for scenario in source.examples)
@@ -103,29 +107,24 @@ class DrawnPool:
             )
         return [None if each is None else self._source.fitted(each) for each in given]
 
-    def begin(
-        self,
-        lanes: NDArray[np.integer],
-        seeds: NDArray[np.uint64],
-        seeded: NDArray[np.bool_],
-        chosen: Sequence[Scenario | None] | None = None,
-    ) -> None:
-        """Put the next missions of some lanes into their slots.
+    def orders(
+        self, begins: NDArray[np.bool_], lanes: SubEnvironments, chosen: Any
+    ) -> NDArray[np.int64]:
+        """Put the next missions of some lanes into their slots, see `LaneMissions`.
 
         Args:
-            lanes: Which.
-            seeds: (L,) of all lanes.
-            seeded: (L,) whose generator begins anew from its seed.
+            begins: (L,) which; where no mission was flown yet, the generator begins from its seed.
+            lanes: Of the batch.
             chosen: (L,) what to fly instead of drawing, None where to draw; None: draw them all.
 
         Raises:
             ValueError: A mission does not fit, or the generator returned none. No slot has changed.
         """
         missions: list[DrawnMission] = []
-        for lane in lanes.tolist():
+        for lane in np.flatnonzero(begins).tolist():
             rng = self._rngs[lane]
-            if seeded[lane] or rng is None:
-                rng = self._rngs[lane] = seeding.np_random(int(seeds[lane]))[0]
+            if lanes.mission[lane] < 0 or rng is None:
+                rng = self._rngs[lane] = seeding.np_random(int(lanes.seed[lane]))[0]
             scenario = chosen[lane] if chosen else None
             before = np.zeros(_WORDS, np.uint64) if scenario else _words_of(rng)
             scenario = scenario or self._source.draw(rng)
@@ -134,6 +133,7 @@ class DrawnPool:
             self._check_events(scenario, has_true_vehicles(scenario, own))
             missions.append(DrawnMission(lane, scenario, before, rng))
         self.install(missions)
+        return np.where(begins, np.arange(len(self)), REST)
 
     def _check_events(self, scenario: Scenario, differs: bool) -> None:
         """Refuse more events, or others, than there is room for."""
@@ -164,11 +164,11 @@ class DrawnPool:
         self.scenarios[lane] = known
         return lane
 
-    def check_drawn(self) -> None:
-        """Refuse to checkpoint missions that cannot be drawn again.
+    def kept(self) -> dict[str, NDArray[Any]]:
+        """The states of the generators that drew the missions.
 
         Raises:
-            ValueError: A mission was not drawn.
+            ValueError: A mission was given to `reset`, not drawn.
         """
         for lane, rng in enumerate(self._rngs):
             if rng is not None and not self.drawn_from[lane].any():
@@ -176,15 +176,17 @@ class DrawnPool:
                     f"the mission of environment {lane} was given to reset(): only missions that "
                     f"were drawn can be kept in a checkpoint"
                 )
+        return {"drawn_from": self.drawn_from}
 
     def redrawn(
-        self, drawn_from: NDArray[np.uint64], begun: NDArray[np.bool_]
-    ) -> list["DrawnMission"]:
+        self, state: Mapping[str, NDArray[Any]], begun: NDArray[np.bool_]
+    ) -> list[DrawnMission]:
         """The missions of `drawn_from` once more, for `install`.
 
         Raises:
             ValueError: These are no states of generators.
         """
+        drawn_from = state["drawn_from"]
         last = np.array([_WORD, _WORD, _WORD, _WORD, 1, 2**32 - 1], dtype=np.uint64)
         check_values({"drawn_from": drawn_from}, {"drawn_from": (0, last)})
         missions: list[DrawnMission] = []
@@ -196,12 +198,12 @@ class DrawnPool:
             missions.append(DrawnMission(lane, self._source.draw(rng), before.copy(), rng))
         return missions
 
-    def slots_of(self, begun: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(L,) lowest and highest index of what a lane may fly: its own slot."""
+    def limits(self, begun: NDArray[np.bool_]) -> dict[str, Any]:
+        """A lane flies its own slot."""
         slots = np.where(begun, np.arange(len(self)), 0)
-        return slots, slots
+        return {"scenario": (slots, slots)}
 
-    def install(self, missions: Sequence["DrawnMission"]) -> None:
+    def install(self, missions: Sequence[DrawnMission]) -> None:
         """Put missions into the slots of their lanes."""
         for lane, scenario, before, rng in missions:
             pool = ScenarioPool(scenario, self.settings, self.features)
@@ -216,7 +218,7 @@ def pool_of(
     scenario: ScenarioLike | Sequence[str | Path | Scenario],
     settings: MissionSettings,
     num_envs: int,
-) -> ScenarioPool | DrawnPool:
+) -> LaneMissions:
     """What a batch flies: the pool of scenarios that do not change, or of those that are drawn.
 
     Raises:
@@ -228,17 +230,6 @@ def pool_of(
     if source.fixed:
         return ScenarioPool(source.example, settings, lanes=num_envs)
     return DrawnPool(source, settings, num_envs)
-
-
-class DrawnMission(NamedTuple):
-    """What a lane flies."""
-
-    lane: int
-    scenario: Scenario
-    before: NDArray[np.uint64]
-    """(6,) the state of the generator before it drew the mission; 0: it was given."""
-    rng: np.random.Generator
-    """Draws the next one."""
 
 
 def _words_of(rng: np.random.Generator) -> NDArray[np.uint64]:

@@ -28,6 +28,7 @@ from uas_coverage_env.env.batch.memory import (
     SWARM_ENERGY,
     SWARM_FIRST_TERM,
     SWARM_REWARD,
+    WAITS,
     Missions,
     new_missions,
 )
@@ -204,6 +205,18 @@ def _keep_end(missions, lane, observation, width):
         final.swarm[lane, column] = missions.lanes.swarm[lane, column]
 
 
+@rare_kernel
+def _pay_nothing(missions, lane):
+    """A mission that has ended and waits is paid once."""
+    lanes, amounts = missions.lanes, missions.learners.amounts
+    for i in range(lanes.rewards.shape[1]):
+        lanes.rewards[lane, i] = 0.0
+        for column in range(REWARD, amounts.shape[2]):
+            amounts[lane, i, column] = 0.0
+    for column in range(SWARM_REWARD, lanes.swarm.shape[1]):
+        lanes.swarm[lane, column] = 0.0
+
+
 @kernel
 def _all_finite(numbers):
     finite = True
@@ -234,7 +247,7 @@ class BatchRules(NamedTuple):
 
     rules: Rules
     autoreset: int
-    """NEXT_STEP, SAME_STEP or DISABLED."""
+    """NEXT_STEP, SAME_STEP, DISABLED or WAITS."""
     step_lane: int
     """Address of the step of a lane, see `lane_code`."""
 
@@ -280,6 +293,8 @@ def step_lane_with(version: Version) -> Any:
         if rarely(order == REST):
             whole = (observation.shape[1], width)
             _copy(rows_view(before, lane, whole), rows_view(observation, lane, whole))
+            if autoreset == WAITS:
+                _pay_nothing(missions, lane)
             return
         begins = order != FLY
         if rarely(begins):
@@ -306,6 +321,8 @@ def step_lane_with(version: Version) -> Any:
             over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
             if over and autoreset == NEXT_STEP:
                 lanes.orders[lane] = DRAW
+            elif over and autoreset == WAITS:
+                lanes.orders[lane] = REST
             elif over and autoreset == SAME_STEP:
                 _keep_end(missions, lane, observation, width)
                 begins = True

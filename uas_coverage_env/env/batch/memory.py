@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.memory import Memory, Values
+from uas_coverage_env.compiled.memory import Memory, Pool, Values
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.episode.memory import LEARNERS, SCRATCH, Learners, Scratch
@@ -14,8 +14,10 @@ from uas_coverage_env.env.observation import K_WAYPOINTS
 from uas_coverage_env.env.report import REPORT_SIZE
 from uas_coverage_env.world import FLYING, WorldState
 
-NEXT_STEP, SAME_STEP, DISABLED = range(3)
-"""When a mission that has ended begins anew: in the next step, in the same, or never by itself."""
+NEXT_STEP, SAME_STEP, DISABLED, WAITS = range(4)
+"""When a mission that has ended begins anew: in the next step, in the same, or never by itself;
+then a step with one that has ended is refused (DISABLED), or it rests and is paid nothing (WAITS).
+"""
 
 FLY, REST, DRAW = -3, -2, -1
 """What a lane does in the coming step: fly, nothing, or begin a mission that is drawn; a number
@@ -24,6 +26,21 @@ from 0 on begins a mission of that scenario."""
 SWARM_ENERGY, SWARM_COVERED, SWARM_REWARD, SWARM_FIRST_TERM = range(4)
 """Columns of a swarm's report: sum of ENERGY, waypoints covered, the reward, and from
 SWARM_FIRST_TERM on the sums of its terms."""
+
+
+class MissionPool(NamedTuple):
+    """All that missions of S scenarios need, for kernels."""
+
+    arenas: Pool
+    """Of `ARENA`."""
+    starts: Pool
+    """Of `STATE`: the worlds at t = 0."""
+    tables: Pool
+    """Of `TABLES`."""
+    learners: Pool
+    """Of `LEARNERS`: at t = 0."""
+    first_observations: Pool
+    """Of `FIRST_OBSERVATION`: at t = 0."""
 
 
 class SubEnvironments(NamedTuple):

@@ -1,17 +1,18 @@
 """Scenarios to draw missions from, in arrays: the arenas, and what learners add to them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.views import lane_view, pool_view
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env.batch.memory import DRAW, REST, MissionPool, SubEnvironments
 from uas_coverage_env.env.batch.slots import Slots
+from uas_coverage_env.env.batch.source import DrawnMission
 from uas_coverage_env.env.episode.arrays import first_observation, learners_sizes, tables_of
 from uas_coverage_env.env.episode.memory import (
     FIRST_OBSERVATION,
@@ -52,21 +53,6 @@ def scene_arrays(
     return arena, tables_of(known, before.ranges)
 
 
-class MissionPool(NamedTuple):
-    """All that missions of S scenarios need, for kernels."""
-
-    arenas: Pool
-    """Of `ARENA`."""
-    starts: Pool
-    """Of `STATE`: the worlds at t = 0."""
-    tables: Pool
-    """Of `TABLES`."""
-    learners: Pool
-    """Of `LEARNERS`: at t = 0."""
-    first_observations: Pool
-    """Of `FIRST_OBSERVATION`: at t = 0."""
-
-
 tables_at = pool_view(TABLES)
 """In a kernel, (`MissionPool.tables`, s) -> the tables of scenario s."""
 
@@ -101,6 +87,7 @@ class ScenarioPool:
         features: One of each kind that any of the scenarios has.
         goes_home: Whether an event of any of them may send a UAS home.
         changes: Whether the scene of any of them may change.
+        draws: False: kernels draw among these.
 
     Raises:
         ValueError: There is no scenario, or one is none of what is allowed.
@@ -173,6 +160,7 @@ class ScenarioPool:
                 self._put(s, ARENA.mission(worlds.arenas, s), tables[s])
         self.n_uas = ARENA.size(worlds.arenas, "U")
         self.n_waypoints = ARENA.size(worlds.arenas, "W")
+        self.draws = False
 
     def __len__(self) -> int:
         return len(self.scenarios)
@@ -222,3 +210,26 @@ class ScenarioPool:
                 f"the pool has indices from 0 to {len(self) - 1}"
             )
         return chosen.astype(np.int64)
+
+    def orders(
+        self, begins: NDArray[np.bool_], lanes: SubEnvironments, chosen: Any
+    ) -> NDArray[np.int64]:
+        """See `LaneMissions`."""
+        return np.where(begins, DRAW if chosen is None else chosen, REST)
+
+    def kept(self) -> dict[str, NDArray[Any]]:
+        """Nothing: seeds and numbers of missions say all."""
+        return {}
+
+    def redrawn(
+        self, state: Mapping[str, NDArray[Any]], begun: NDArray[np.bool_]
+    ) -> list[DrawnMission]:
+        """See `LaneMissions`."""
+        return []
+
+    def install(self, missions: Sequence[DrawnMission]) -> None:
+        """See `LaneMissions`."""
+
+    def limits(self, begun: NDArray[np.bool_]) -> dict[str, Any]:
+        """See `LaneMissions`."""
+        return {}

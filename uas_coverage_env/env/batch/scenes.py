@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.state import STATE, WorldState
-from uas_coverage_env.env.batch.drawn import DrawnPool
 from uas_coverage_env.env.batch.memory import Missions
-from uas_coverage_env.env.batch.pool import ScenarioPool, scene_arrays
+from uas_coverage_env.env.batch.pool import scene_arrays
+from uas_coverage_env.env.batch.source import LaneMissions
 from uas_coverage_env.env.episode.arrays import observe_scene
 from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Learners, Observing, Tables
 from uas_coverage_env.features.event import OfUas
@@ -32,7 +32,7 @@ class SceneLane(NamedTuple):
 
 
 def change_scenes(
-    pool: ScenarioPool | DrawnPool,
+    pool: LaneMissions,
     missions: Missions,
     flew: NDArray[np.bool_],
     observing: Observing,
@@ -70,7 +70,7 @@ class SceneChanges:
         observing: What is observed.
     """
 
-    def __init__(self, pool: ScenarioPool | DrawnPool, observing: Observing) -> None:
+    def __init__(self, pool: LaneMissions, observing: Observing) -> None:
         self._pool, self._observing = pool, observing
         self._made: dict[tuple[Any, ...], tuple[Scenario, Arena, Tables]] = {}
 
@@ -125,7 +125,7 @@ class SceneChanges:
         return self._made[key]
 
 
-def _laid_out(pool: ScenarioPool | DrawnPool, scene: int, known: Scenario) -> tuple[Arena, Tables]:
+def _laid_out(pool: LaneMissions, scene: int, known: Scenario) -> tuple[Arena, Tables]:
     """The arrays of what the scene of a mission has become, which was this one of the pool."""
     before = TABLES.mission(pool.arrays.tables, scene)
     return scene_arrays(known, pool.settings, pool.features, before)
@@ -177,7 +177,7 @@ def _scene_after_all(
 
 
 def install_scenes(
-    pool: ScenarioPool | DrawnPool,
+    pool: LaneMissions,
     scenario: NDArray[np.int64],
     scene: NDArray[np.int64],
     changed: Mapping[int, Scenario],

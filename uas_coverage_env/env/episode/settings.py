@@ -50,6 +50,11 @@ _INSIDE = {"max_cycles": "max_steps"}
 """Keyword arguments that bear the name which libraries have for them -> the name here."""
 
 
+def inside_name(keyword: str) -> str:
+    """The attribute of `MissionSettings` that a keyword argument is."""
+    return _INSIDE.get(keyword, keyword)
+
+
 @dataclass(frozen=True)
 class MissionSettings:
     """What the environments take as keyword arguments, whatever their interface.
@@ -60,8 +65,7 @@ class MissionSettings:
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.
         reward_weights: Mapping from reward term to weight; the other terms keep theirs.
-        max_steps: Time limit of the mission, in the environments `max_cycles`; None: the
-            scenario's `max_steps`.
+        max_steps: Time limit of the mission [steps]; None: the scenario's `max_steps`.
         observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
             observation (`default`, `local`, `grid`); None: those of the version.
         reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
@@ -152,7 +156,7 @@ class MissionSettings:
                 raise UnknownArgumentError(
                     f"unexpected keyword argument {name!r}; there are {taken}"
                 )
-        inside = {_INSIDE.get(name, name): value for name, value in given.items()}
+        inside = {inside_name(name): value for name, value in given.items()}
         return cls(**inside, version=version)
 
     @property
