@@ -3,18 +3,13 @@
 import inspect
 import re
 import textwrap
-from collections.abc import Callable
-from dataclasses import fields
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, ClassVar
 
 from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, inside_name
 from uas_coverage_env.env.observation import layout_table
 from uas_coverage_env.env.report import InfoField
 from uas_coverage_env.env.rewards import rewards_table
-from uas_coverage_env.env.versions import Version
-
-C = TypeVar("C", bound=type)
-F = TypeVar("F", bound=Callable[..., Any])
+from uas_coverage_env.env.versions import V0, Version
 
 _SETTING = re.compile(r"^( +)action: (?:.*\n)+?\1 +.*as in the version\.\n", re.MULTILINE)
 """The settings in a docstring: from the first of them to the end of the last."""
@@ -34,41 +29,33 @@ def with_settings_written_out(source: str) -> str:
     return _SETTING.sub(lambda match: textwrap.indent(settings_text(), match[1]), source)
 
 
-def takes_settings(function: F) -> F:
-    """Show, for each of `**settings`, its name, type and default in the signature."""
-    hints = get_type_hints(MissionKeywords)
-    defaults = {field.name: field.default for field in fields(MissionSettings)}
-    signature = inspect.signature(function)
-    own = [each for each in signature.parameters.values() if each.kind != each.VAR_KEYWORD]
-    named = [
-        inspect.Parameter(
-            name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=defaults[inside_name(name)],
-            annotation=hints[name],
-        )
-        for name in MissionKeywords.__annotations__
-    ]
-    shown: Any = function
-    shown.__signature__ = signature.replace(parameters=[*own, *named])
-    return function
-
-
 def infos_text(infos: tuple[InfoField, ...]) -> str:
     """The infos as a list in Markdown."""
     return "\n".join(f"- `{each.name}`: {each.meaning}" for each in infos)
 
 
-def with_tables(environment: C) -> C:
-    """Put the tables of its version into an environment's docstring."""
-    version: Version = environment.version  # pyrefly: ignore[missing-attribute]
-    if environment.__doc__ is not None:  # None under python -OO
+class Versioned:
+    """An environment of one version; a subclass with another `version` is that of this version.
+
+    What a docstring says of observations, rewards and infos comes from the tuples of the version.
+    """
+
+    version: ClassVar[Version] = V0
+    metadata: dict[str, Any]
+    _described: ClassVar[str | None] = None
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "name" in cls.metadata:
+            cls.metadata = {**cls.metadata, "name": f"uas_coverage_{cls.version.name}"}
+        cls._described = cls.__doc__ or cls._described
+        if cls._described is None:  # under python -OO
+            return
         tables = {
-            "{observations}": layout_table(version.observation),
-            "{rewards}": rewards_table(version.reward),
-            "{infos}": infos_text(version.infos),
+            "{observations}": layout_table(cls.version.observation),
+            "{rewards}": rewards_table(cls.version.reward),
+            "{infos}": infos_text(cls.version.infos),
         }
+        cls.__doc__ = cls._described
         for place, table in tables.items():
-            indented = table.replace("\n", "\n        ")
-            environment.__doc__ = environment.__doc__.replace(place, indented)
-    return environment
+            cls.__doc__ = cls.__doc__.replace(place, table.replace("\n", "\n        "))

@@ -10,15 +10,14 @@ from gymnasium.utils import seeding
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from uas_coverage_env.env.api.documentation import takes_settings, with_tables
+from uas_coverage_env.env.api.documentation import Versioned
 from uas_coverage_env.env.api.forms import LastKnown, observation_space, shown
 from uas_coverage_env.env.episode.express import action_of
 from uas_coverage_env.env.episode.global_state import global_space
 from uas_coverage_env.env.episode.sequence import MissionSequence
-from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings
+from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, takes_settings
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.report import REWARD, STATUS
-from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
@@ -28,8 +27,7 @@ Observations = dict[str, Any]
 Infos = dict[str, dict[str, Any]]
 
 
-@with_tables
-class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
+class CoverageParallelEnv(Versioned, ParallelEnv[str, NDArray[np.float32], Any]):
     """Several UAS cover the waypoints of an area and come home before their batteries end.
 
     Description:
@@ -131,9 +129,8 @@ class CoverageParallelEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
     """
 
-    version: ClassVar[Version] = V0
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]
-        "name": f"uas_coverage_{V0.name}",
+        "name": "uas_coverage",
         "render_modes": offered(RENDER_MODES),
         "render_fps": RENDER_FPS,
         "is_parallelizable": True,

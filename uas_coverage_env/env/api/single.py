@@ -11,24 +11,22 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.api.documentation import takes_settings, with_tables
+from uas_coverage_env.env.api.documentation import Versioned
 from uas_coverage_env.env.api.forms import observation_space, shown
 from uas_coverage_env.env.api.spec import plain_spec
 from uas_coverage_env.env.episode.express import joint_action_of
 from uas_coverage_env.env.episode.infos import absent, flat
 from uas_coverage_env.env.episode.sequence import MissionSequence
-from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings
+from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, takes_settings
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.report import COVERED, ENERGY, FIRST_TERM, STATUS
-from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
 
 
-@with_tables
-class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
+class CoverageSwarmEnv(Versioned, gymnasium.Env[Any, NDArray[Any]]):
     """One agent flies several UAS that cover an area; `CoverageParallelEnv` for a single mind.
 
     Description:
@@ -92,7 +90,6 @@ class CoverageSwarmEnv(gymnasium.Env[Any, NDArray[Any]]):
         v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
     """
 
-    version: ClassVar[Version] = V0
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]
         "render_modes": offered(RENDER_MODES),
         "render_fps": RENDER_FPS,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.api.documentation import takes_settings
+from uas_coverage_env.env.api.documentation import Versioned
 from uas_coverage_env.env.api.forms import observation_space, shown
 from uas_coverage_env.env.api.spec import plain_spec
 from uas_coverage_env.env.batch.batch import CoverageBatch
@@ -23,11 +23,10 @@ from uas_coverage_env.env.batch.memory import (
 )
 from uas_coverage_env.env.episode.infos import flat
 from uas_coverage_env.env.episode.sequence import check_options
-from uas_coverage_env.env.episode.settings import MissionKeywords
+from uas_coverage_env.env.episode.settings import MissionKeywords, takes_settings
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, offered
 from uas_coverage_env.env.rendering.tiles import BATCH_RENDER_MODES, Tiles
 from uas_coverage_env.env.report import FILTERED, STATUS
-from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import ABSENT, Command
 
@@ -47,7 +46,7 @@ Arrays = tuple[
 ]
 
 
-class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
+class CoverageVectorEnv(Versioned, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
     """`num_envs` missions of `CoverageSwarmEnv`, flown by one compiled call.
 
     Spaces, order, observations, rewards, terminations and truncations are those of
@@ -119,7 +118,6 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         ValueError: An argument is none of what is allowed; says what is.
     """
 
-    version: ClassVar[Version] = V0
     metadata: dict[str, Any] = {  # noqa: RUF012  # as Gymnasium declares it
         "render_modes": offered(BATCH_RENDER_MODES),
         "render_fps": RENDER_FPS,

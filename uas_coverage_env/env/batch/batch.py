@@ -45,7 +45,7 @@ from uas_coverage_env.env.episode.express import Moment, joint_action_of
 from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Learners
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.pay import paying_of
-from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings
+from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, takes_settings
 from uas_coverage_env.env.episode.step import ACCEPTED, Rules
 from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.mission import MissionBrief
@@ -118,6 +118,7 @@ class CoverageBatch:
         ValueError: An argument is none of what is allowed; says what is.
     """
 
+    @takes_settings
     def __init__(
         self,
         num_envs: int,

@@ -53,7 +53,7 @@ def _address_of(block: ObservationBlock) -> int:
 @cache
 def _with_notes(write: Any, needs: tuple[Any, ...]) -> Any:
     """The kernel of a block after those that it needs."""
-    note = _noted(needs)
+    note = noted(needs)
 
     @kernel
     def write_with_notes(arena, state, tables, learners, i, parameters, row):
@@ -63,7 +63,7 @@ def _with_notes(write: Any, needs: tuple[Any, ...]) -> Any:
     return write_with_notes
 
 
-def _noted(needs: Sequence[Any]) -> Any:
+def noted(needs: Sequence[Any]) -> Any:
     """One kernel that calls others in turn."""
     if not needs:
 
@@ -72,7 +72,7 @@ def _noted(needs: Sequence[Any]) -> Any:
             pass
 
         return note_nothing
-    note, rest = needs[0], _noted(needs[1:])
+    note, rest = needs[0], noted(needs[1:])
 
     @inlined_kernel
     def note_both(arena, state, tables, learners, i):
@@ -117,7 +117,7 @@ def observe_one_with(own: Blocks, *, calls: bool = True) -> Any:
         `observe_one(arena, state, tables, learners, observing, i, row)`: writes the observation of
         UAS i into its row (V,) of float32, and the waypoints that it chooses among.
     """
-    note = _noted(tuple(dict.fromkeys(note for block in own for note in block.needs)))
+    note = noted(tuple(dict.fromkeys(note for block in own for note in block.needs)))
     write = _written(own, 0, 0)
 
     @inlined_kernel

@@ -1,8 +1,9 @@
 """How missions are flown and paid: what every environment can be told, in one record."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypedDict, get_args
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, TypedDict, TypeVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import Dynamics
 from uas_coverage_env.world.packs import mission_features
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 _LONGEST = 100_000
 _SWITCHES = ("return_mode", "safety_filter", "mask_in_observation", "images_apart", "flat_infos")
@@ -130,8 +133,9 @@ class MissionSettings:
                 'take observation="grid", or leave it out'
             )
         terms = version.reward if self.reward is None else self.reward
-        object.__setattr__(self, "reward", checked_blocks("reward", "terms", terms, RewardTerm))
-        weights_of(self.reward, self.reward_weights)
+        terms = checked_blocks("reward", "terms", terms, RewardTerm)
+        object.__setattr__(self, "reward", terms)
+        weights_of(terms, self.reward_weights)
         if self.disturbances is not None:
             object.__setattr__(self, "disturbances", checked_features(self.disturbances))
 
@@ -198,3 +202,23 @@ class MissionSettings:
         if self.max_steps is None:
             return scenario
         return scenario.model_copy(update={"max_steps": int(self.max_steps)})
+
+
+def takes_settings(function: F) -> F:
+    """Show, for each of `**settings`, its name, type and default in the signature."""
+    hints = get_type_hints(MissionKeywords)
+    defaults = {field.name: field.default for field in fields(MissionSettings)}
+    signature = inspect.signature(function)
+    own = [each for each in signature.parameters.values() if each.kind != each.VAR_KEYWORD]
+    named = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=defaults[inside_name(name)],
+            annotation=hints[name],
+        )
+        for name in MissionKeywords.__annotations__
+    ]
+    shown: Any = function
+    shown.__signature__ = signature.replace(parameters=[*own, *named])
+    return function

@@ -25,7 +25,6 @@ from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.observation.nearest import write_around
 from uas_coverage_env.env.report import FIRST_TERM
 from uas_coverage_env.mission import MissionBrief, WorldView
-from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import FLYING, Acceleration, Command, GoTo, SwarmState, Velocity, Wrench
 
@@ -70,14 +69,17 @@ class MissionInterface:
         ValueError: A block, a term or a kind cannot be compiled.
     """
 
+    _revisions = 0
+
     def __init__(
         self, mission: MissionBrief | World, settings: MissionSettings | None = None
     ) -> None:
         self.settings = settings = settings or MissionSettings()
-        self._flown = mission if isinstance(mission, World) else WorldView(mission)
-        self._brief = None if isinstance(mission, World) else mission
-        self._names = [uas.name for uas in self._known().uas]
-        self.actions = actions_of(settings.kind, self._known())
+        self._world = mission if isinstance(mission, World) else None
+        self._view = None if isinstance(mission, World) else WorldView(mission)
+        self._scenario = mission.known if isinstance(mission, World) else mission.as_scenario()
+        self._names = [uas.name for uas in self._scenario.uas]
+        self.actions = actions_of(settings.kind, self._scenario)
         version = settings.version
         self._acting = acting_of(self.actions.kind, version.actions)
         self._observe = observe_with(version.observation)
@@ -88,18 +90,20 @@ class MissionInterface:
         self._flew = np.ones(len(self._names), np.bool_)
         self._lay_out()
 
-    def _known(self) -> Scenario:
-        """The scenario as it is known now."""
-        return self._flown.known if self._brief is None else self._brief.as_scenario()
-
     def _lay_out(self) -> None:
         """Make the arrays; in a world again where an event has changed the scene."""
-        settings = self.settings
-        self._revisions = getattr(self._flown, "revisions", 0)
+        if self._world is not None:
+            self._scenario, self._revisions = self._world.known, self._world.revisions
         sizes, self._tables, self._learners, self._scratch = arrays_of(
-            self._flown.arena, self._known(), settings, self.actions
+            self._flown.arena, self._scenario, self.settings, self.actions
         )
         self._observation = FIRST_OBSERVATION.zeros(sizes).observation
+
+    @property
+    def _flown(self) -> World | WorldView:
+        flown = self._world or self._view
+        assert flown is not None
+        return flown
 
     @property
     def candidates(self) -> NDArray[np.int64]:
@@ -115,9 +119,10 @@ class MissionInterface:
         Returns:
             (U, V), an array of its own; the row of a UAS that has ended is what it saw last.
         """
-        assert isinstance(self._flown, WorldView)
-        self._flown.update(swarm)
-        arena, state, learners = self._flown.arena, self._flown.state, self._learners
+        view = self._view
+        assert view is not None  # what a planner is told is not told of a world
+        view.update(swarm)
+        arena, state, learners = view.arena, view.state, self._learners
         write_around(state.uncovered, self._tables.neighbours, learners.around)
         self._observe(
             arena, state, self._tables, learners, self._observing, self._flew, self._observation
@@ -172,7 +177,7 @@ class MissionInterface:
             (U, R) in the order of `settings.reward`; zero for UAS that did not fly. The reward is
             their sum.
         """
-        if getattr(self._flown, "revisions", 0) != self._revisions:
+        if self._world is not None and self._world.revisions != self._revisions:
             self._lay_out()
         self._scratch.commands[:] = commands
         self._scratch.outcome[:] = outcome
