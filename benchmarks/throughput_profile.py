@@ -117,7 +117,7 @@ def _other_contacts(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _coverage(arena, state, tables, view, rules, spare, row):
-    cover(arena, state, state.step[0], view.scratch.outcome)
+    cover(arena, state, state.step[0] + 1, view.scratch.outcome)
     land(arena, state, view.scratch.outcome)
 
 
