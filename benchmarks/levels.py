@@ -13,20 +13,25 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.statistics import iqm
-from uas_coverage_env.tasks import LEVELS, Anchors, scored
-from uas_coverage_env.tasks.scoring import RANDOM
-from uas_coverage_env.tasks.store import ScoreStore
+from uas_coverage_env.runner import rows_in
+from uas_coverage_env.tasks import LEVELS, SPLITS
+from uas_coverage_env.tasks.scoring import RANDOM, Anchors, MissionScore, scored
 from uas_coverage_env.tasks.table import markdown
 
 ROOT = Path(__file__).parents[1]
 ANCHORS = ROOT / "uas_coverage_env" / "tasks" / "anchors.json"
 PAGE = ROOT / "docs" / "level_scores.md"
+Flown = dict[str, dict[str, list[MissionScore]]]
+"""Level -> planner -> its missions."""
+
 FIRST, LAST = "<!-- scores -->\n", "<!-- end of scores -->"
 
 
@@ -34,36 +39,45 @@ def main() -> None:
     """Write anchors and tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path, help="The --out of `uas-coverage score`.")
-    store = ScoreStore(parser.parse_args().folder / "test")
-    anchors = {level: anchors_from(store, level) for level in LEVELS if store.planners(level)}
+    flown = missions_in(parser.parse_args().folder)
+    anchors = {level: anchors_from(planners) for level, planners in flown.items()}
     ANCHORS.write_text(json.dumps(anchors, indent=2) + "\n", encoding="utf-8")
     text = PAGE.read_text("utf-8")
     before, first, rest = text.partition(FIRST)
     _, last, after = rest.partition(LAST)
     if not first or not last:
         raise SystemExit(f"{PAGE}: has no {FIRST.strip()} ... {LAST}")
-    PAGE.write_text(before + first + tables(store) + last + after, encoding="utf-8")
+    PAGE.write_text(before + first + tables(flown) + last + after, encoding="utf-8")
 
 
-def anchors_from(store: ScoreStore, level: str) -> dict[str, Any]:
-    """The anchors of a level, over the missions that all of its planners have flown."""
+def missions_in(folder: Path) -> Flown:
+    """The test missions of a folder of `uas-coverage score`."""
+    flown: Flown = {}
+    for row in sorted(rows_in(folder, Row), key=lambda row: row.seed):
+        if row.seed in SPLITS["test"]:
+            mission = MissionScore.of(row)
+            flown.setdefault(row.level, {}).setdefault(row.label, []).append(mission)
+    return flown
+
+
+def anchors_from(planners: Mapping[str, Sequence[MissionScore]]) -> dict[str, Any]:
+    """The anchors of a level, over the missions of its planners."""
     middle = {
-        planner: float(iqm(np.array([flown.value for flown in store.missions(level, planner)])))
-        for planner in store.planners(level)
+        planner: float(iqm(np.array([one.value for one in missions])))
+        for planner, missions in planners.items()
     }
     best = max((planner for planner in middle if planner != RANDOM), key=middle.__getitem__)
-    flown = Anchors(middle[RANDOM], middle[best], best, len(store.missions(level, best)))
+    flown = Anchors(middle[RANDOM], middle[best], best, len(planners[best]))
     return dataclasses.asdict(flown)
 
 
-def tables(store: ScoreStore) -> str:
+def tables(flown: Flown) -> str:
     """The tables of all levels that were flown."""
     parts = []
     for level, task in LEVELS.items():
-        planners = store.planners(level)
-        if planners:
-            flown = {planner: scored(level, store.missions(level, planner)) for planner in planners}
-            parts.append(f"\n`{task.id}`\n\n{markdown(flown)}\n")
+        if level in flown:
+            scores = {planner: scored(level, each) for planner, each in flown[level].items()}
+            parts.append(f"\n`{task.id}`\n\n{markdown(scores)}\n")
     return "".join(parts) + "\n"
 
 

@@ -12,17 +12,19 @@ the mission that is flown. Needs the extra `learn`.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
+from uas_coverage_agents.reference.policy import ReferencePolicy
 from uas_coverage_agents.reference.settings import Reference, reference_named, reference_names
 
-from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.tasks import LEVELS, Score, score, scored
-from uas_coverage_env.tasks.scoring import MissionScore
+from uas_coverage_env.leaderboard import Row
+from uas_coverage_env.leaderboard.flying import flown
+from uas_coverage_env.runner import opened
+from uas_coverage_env.tasks import LEVELS, Score
+from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
 
 PAGE = Path(__file__).parents[1] / "docs" / "level_scores.md"
 FIRST, LAST = "<!-- reference learners: {} -->\n", "<!-- end of reference learners: {} -->"
@@ -108,21 +110,28 @@ def result_of(name: str, reference: Reference, level: str, given: argparse.Names
 
         trained = train_reference(reference, level, seed, directory, told)
         steps, process_s = steps + trained.steps, process_s + trained.process_s
-        kept = directory / "missions.json"
-        rows = json.loads(kept.read_text("utf-8")) if kept.exists() else []
-        known = [MissionScore(**row) for row in rows]
-
-        def keep(mission: MissionScore, known: list = known, kept: Path = kept) -> None:
-            known.append(mission)
-            write_atomically(kept, json.dumps([asdict(each) for each in known]).encode())
-
-        flown = score(
-            trained.policy, level, missions=given.missions, known=tuple(known), on_mission=keep
-        )
-        missions += flown.missions
+        missions += score_of(trained.policy, level, given.missions, directory)
     mean_steps = round(steps / given.seeds)
     mean_s = process_s / given.seeds
     return Result(name, reference, mean_steps, mean_s, given.seeds, scored(level, missions))
+
+
+def score_of(
+    policy: ReferencePolicy, level: str, missions: int, directory: Path
+) -> list[MissionScore]:
+    """The first test missions of a level; those that the folder holds are not flown again."""
+    task = LEVELS[level]
+    spec = spec_of(policy, task)
+    with opened(directory / "flights", DESCRIPTION, Row) as store:
+        kept, found = {row.key: row for row in store.rows()}, []
+        for seed, scenario in task.scenarios("test", missions).items():
+            entry = entry_of(spec, task, seed, scenario)
+            row = kept.get(entry.key)
+            if row is None:
+                row = Row.of(entry, flown(entry), "")
+                store.add(row)
+            found.append(MissionScore.of(row))
+    return found
 
 
 def table(results: list[Result]) -> str:

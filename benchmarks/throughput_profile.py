@@ -15,6 +15,7 @@ from rich.table import Table
 
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.views import lane_view, rows_view, slice_view
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.batch.pool import learners_of, tables_at
 from uas_coverage_env.env.episode.act import acting_of, write_commands_with
@@ -25,11 +26,11 @@ from uas_coverage_env.env.episode.step import Rules, step_learners_with
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, ObservationBlock
 from uas_coverage_env.env.observation.nearest import nearest_waypoints
 from uas_coverage_env.env.versions import V0
-from uas_coverage_env.simulation import advance
 from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.simulation.pool import arena_of, state_of
-from uas_coverage_env.vehicle import N_STATES, lpv_step
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.simulation.step import advance
+from uas_coverage_env.vehicle import lpv_step
+from uas_coverage_env.vehicle.layout import N_STATES
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.contacts import (
     check_fence_and_battery,

@@ -42,8 +42,9 @@ from uas_coverage_env.env.observation import (
 )
 from uas_coverage_env.env.rendering.screen import RENDER_MODES
 from uas_coverage_env.env.rewards import rewards_table
-from uas_coverage_env.flight import Why
+from uas_coverage_env.flight import Why, figures
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
+from uas_coverage_env.leaderboard.scores import columns
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
 
@@ -336,6 +337,31 @@ def _without_meanings(rows: str) -> str:
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
+def flight_figures() -> str:
+    """Every figure of a flight: its name, its key in the file, what it is."""
+    rows = [
+        (
+            f"`{name}`",
+            f"`{key}`" if (key := name if each.key is None else each.key) else "",
+            each.meaning,
+        )
+        for name, each in FIGURES.items()
+    ]
+    return table(("figure", "in `summary.json`", ""), rows)
+
+
+def comparison_columns() -> str:
+    """Every column of a comparison: its heading, its name in the files, what it is."""
+    rows = [
+        (f"*{each.heading}*" if each.table else "", f"`{name}`", each.meaning)
+        for name, each in columns().items()
+    ]
+    return table(("in the tables", "in the files", ""), rows)
+
+
+FIGURES = {each.name: each for each in figures.FIGURES}
+"""Those of this package, whatever others are installed."""
+
 OPERATIONS = {
     "areas": ("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
     "exports": ("exported_files", "autopilot_parameters", "autopilot_failures"),
@@ -375,6 +401,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "event_fields": event_fields,
     "families": families_table,
     "planners": planners,
+    "figures": flight_figures,
+    "comparison_columns": comparison_columns,
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
     **{name: of_operations(room, name) for room, names in OPERATIONS.items() for name in names},
 }

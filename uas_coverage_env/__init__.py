@@ -4,7 +4,7 @@ Importing the package registers the environments with Gymnasium and PettingZoo, 
 names are imported when they are first asked for, from where `__init__.pyi` says.
 """
 
-from uas_coverage_env.program import ctrl_c_ends_the_program
+from uas_coverage_env.interruptions import ctrl_c_ends_the_program
 
 with ctrl_c_ends_the_program():
     import lazy_loader

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from uas_coverage_env import MissionBrief, generate_scenario, load_scenario
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env import CoverageParallelEnv, MissionInterface
-from uas_coverage_env.world import FLYING
 
 
 @pytest.mark.parametrize("assisted", [False, True])

@@ -11,11 +11,12 @@ import zipfile
 from pathlib import Path
 from types import SimpleNamespace
 
-import filelock
 import numpy as np
 import pytest
 import torch
+from leaderboard_rows import flights_in
 from stable_baselines3 import PPO
+from uas_coverage_agents import training
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.training import command, curve, loop
 from uas_coverage_agents.training.config import load_config
@@ -26,13 +27,15 @@ from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import evaluate
+from uas_coverage_env.leaderboard import Row
+from uas_coverage_env.runner import opened, rows_in
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
 ASSISTED = {"return_mode": True, "safety_filter": True}
 
 
 def train(directory, *arguments: str) -> int:
-    usual = ["--missions", "1", "--baselines", "nearest-waypoint"]
+    usual = ["--missions", "1", "--baselines", "nearest-waypoint", "--jobs", "1"]
     return main(["train", TINY, *usual, "--out", str(directory), *arguments])
 
 
@@ -89,12 +92,23 @@ def test_the_curve_has_the_default_return_and_stands_beside_planners_that_do_not
     assert score.measures["episode_return"].mean == returns[-1]
 
 
-def test_a_training_that_an_older_version_began_goes_on(trained, tmp_path, capsys):
+def test_a_training_that_an_older_version_began_is_refused_in_a_line(trained, tmp_path, capsys):
     begun = shutil.copytree(trained, tmp_path / "run")
-    order = (begun / "order.json").read_text()
-    (begun / "order.json").write_text(order.replace('"policy"', '"player"'))
-    assert train(begun) == 0
-    assert "going on with the training there" in capsys.readouterr().out
+    (begun / "flights.sqlite").rename(begun / "order.json")
+    for more in ([], ["--overwrite"]):
+        line = refusal(capsys, TINY, "--missions", "1", "--out", str(begun), *more)
+        assert "holds no training that this version goes on with; give another --out" in line
+
+
+def test_every_flight_of_the_curve_and_of_the_score_is_kept_once(trained):
+    rows = rows_in(trained, Row)
+    labels = [row.label for row in rows]
+    assert len(set(labels)) == len(labels), "one mission each"
+    last = f"policy after {read_curve(trained)[-1]['steps']} steps"
+    assert {"nearest-waypoint", "policy after 0 steps", last} <= set(labels)
+    returns = {row.label: row.episode_return for row in rows}
+    assert returns[last] == float(read_curve(trained)[-1]["return"])
+    assert len(rows) == len(read_curve(trained)) + 1
 
 
 def test_a_baseline_that_is_no_planner_is_refused_before_anything_is_begun(tmp_path, capsys):
@@ -107,7 +121,7 @@ def test_a_baseline_that_is_no_planner_is_refused_before_anything_is_begun(tmp_p
 def test_a_killed_training_goes_on_to_the_same_weights(trained, tmp_path, capsys):
     script = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
     command_line = [sys.executable, "-c", script, "train", TINY]
-    usual = ["--missions", "1", "--baselines", "none", "--checkpoint-s", "0"]
+    usual = ["--missions", "1", "--baselines", "none", "--checkpoint-s", "0", "--jobs", "1"]
     directory = tmp_path / "killed"
     process = subprocess.Popen(
         [*command_line, *usual, "--out", str(directory)],
@@ -125,6 +139,10 @@ def test_a_killed_training_goes_on_to_the_same_weights(trained, tmp_path, capsys
     assert killed.description.weights_sha256 == undisturbed.description.weights_sha256
     steps = [[row["steps"] for row in read_curve(run)] for run in (directory, trained)]
     assert steps[0] == steps[1]
+    kept = [
+        [row for row in flights_in(run) if "policy" in row.label] for run in (directory, trained)
+    ]
+    assert kept[0] == kept[1], "no flight is lost, and none is there twice"
 
 
 def read_curve(directory) -> list[dict[str, str]]:
@@ -172,7 +190,7 @@ def test_the_minutes_of_a_training_begin_with_its_first_step(tmp_path, monkeypat
 def test_other_settings_are_not_mixed_into_a_training(trained, capsys):
     for arguments in (["--seed", "1"], ["--set", "learning.gamma=0.5"], ["--minutes", "1"]):
         line = refusal(capsys, TINY, "--missions", "1", "--out", str(trained), *arguments)
-        assert "holds a training with other settings" in line
+        assert "holds the flights of another command: " in line
 
 
 @pytest.mark.usefixtures("curve_without_picture")
@@ -213,14 +231,17 @@ def test_a_folder_with_something_else_is_left_alone(tmp_path, capsys):
 
 
 def test_two_trainings_do_not_work_in_one_folder(trained, capsys):
-    with filelock.FileLock(trained / ".lock"):
+    description = command._record(TrainingJob("tiny", load_config(TINY), 0, missions=1))
+    with opened(trained, description, Row):
         assert main(["train", TINY, "--missions", "1", "--out", str(trained)]) == 2
-    assert "another training is at work there" in capsys.readouterr().err
+    assert "another command is at work there" in capsys.readouterr().err
 
 
 def test_without_the_extra_one_line_names_it(monkeypatch, tmp_path, capsys):
     # a module that is None is one that cannot be imported
-    monkeypatch.setitem(sys.modules, "filelock", None)
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.logger", None)
+    monkeypatch.delitem(sys.modules, loop.__name__)
+    monkeypatch.delattr(training, "loop")
     line = refusal(capsys, TINY, "--out", str(tmp_path / "run"))
     assert "python -m pip install 'uas-coverage-env[learn]'" in line
     assert not (tmp_path / "run").exists()

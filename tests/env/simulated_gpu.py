@@ -24,7 +24,7 @@ from uas_coverage_env.env.gpu.missions import CudaMissions
 from uas_coverage_env.env.report import CONTACT, LIMITS, REWARD
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.scenario.packs import Sorties
-from uas_coverage_env.vehicle import limit_names
+from uas_coverage_env.vehicle.limits import limit_names
 
 N_LANES, N_STEPS = 2, 13
 

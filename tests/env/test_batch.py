@@ -6,6 +6,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from practice_grounds import practice_ground, with_roles
 
+from uas_coverage_env.entities.state import FLYING, LOST
 from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
 from uas_coverage_env.env.batch.kernel import ABSENT, drawn
 from uas_coverage_env.env.episode.settings import MissionSettings
@@ -13,7 +14,7 @@ from uas_coverage_env.env.report import CONTACT, ENERGY, FIRST_TERM, LIMITS, STA
 from uas_coverage_env.env.rewards import REWARD_TERMS
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
-from uas_coverage_env.world import FLYING, LOST, build_arena
+from uas_coverage_env.world import build_arena
 from uas_coverage_env.world.arena import ARENA
 
 MIXED = (

@@ -28,7 +28,7 @@ from uas_coverage_env.env import (
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import VX, VY, X, Y
+from uas_coverage_env.vehicle.layout import VX, VY, X, Y
 
 BEACON = beacon(30.0, -20.0)
 OBSERVED = (*OBSERVATION, BEACON)

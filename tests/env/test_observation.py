@@ -19,7 +19,7 @@ from uas_coverage_env.env import (
 )
 from uas_coverage_env.env.observation.surroundings import free_way
 from uas_coverage_env.scenario import generate_scenario, load_scenario
-from uas_coverage_env.vehicle import DOD, PHI, U_TH, VX, WX
+from uas_coverage_env.vehicle.layout import DOD, PHI, U_TH, VX, WX
 from uas_coverage_env.world import build_arena
 
 

@@ -22,8 +22,9 @@ from uas_coverage_env.env.actions.wrench import WRENCH
 from uas_coverage_env.env.report import CONTACT
 from uas_coverage_env.features.wind import Gust
 from uas_coverage_env.scenario import Waypoint, Wind
-from uas_coverage_env.vehicle import LIMIT_NAMES, VX, VY, load_vehicle
-from uas_coverage_env.vehicle.layout import PHI, THETA
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY
+from uas_coverage_env.vehicle.limits import LIMIT_NAMES
 from uas_coverage_env.world import CommandKind
 
 WIDE = {"n_uas": 2, "size_m": 2000.0}

@@ -1,17 +1,17 @@
 """What planners do as data to learn from: exact observations, labels in hindsight, safe files."""
 
-import json
-
 import numpy as np
 import pytest
+from leaderboard_rows import flights_in
 
 from uas_coverage_env import load_planner, load_scenario, rollout, uas_coverage_v0
 from uas_coverage_env.cli import main
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Assistants, Demonstrations, demonstrate, episode_return
+from uas_coverage_env.flight import Assistants, Demonstrations, demonstrate
 from uas_coverage_env.flight.demonstrations import UNKNOWN_CHOICE, written
+from uas_coverage_env.flight.metrics import episode_return
 
 SCENARIO = load_scenario("open_field")
 
@@ -117,15 +117,67 @@ def test_missions_survive_their_files_and_damage_is_named(shown, tmp_path):
         Demonstrations.load(tmp_path / "nowhere")
 
 
+def asked(out, *more, planner="nearest-waypoint"):
+    words = ["demonstrate", "open_field", "--planner", planner, "--jobs", "1"]
+    return [*words, "--out", str(out), *more]
+
+
 def test_the_command_goes_on_where_it_was_and_keeps_planners_apart(tmp_path, capsys):
-    command = ["demonstrate", "open_field", "--planner", "nearest-waypoint", "--jobs", "1"]
-    command += ["--out", str(tmp_path)]
-    assert main(command) == 0
+    assert main(asked(tmp_path)) == 0
     kept = (tmp_path / "open_field.npz").stat().st_mtime_ns
-    assert main(command) == 0
-    assert "1 of 1 missions are there" in capsys.readouterr().out
+    assert main(asked(tmp_path)) == 0
+    assert "1 of 1 flights are there" in capsys.readouterr().out
     assert (tmp_path / "open_field.npz").stat().st_mtime_ns == kept
-    assert json.loads((tmp_path / "demonstrations.json").read_text())["seed"] == 0
-    assert main([*command, "--seed", "1"]) == 2
+    assert main(asked(tmp_path, "generated:900000")) == 0
+    assert [one["scenario"] for one in Demonstrations.load(tmp_path).missions] == [
+        "open_field",
+        "town-s900000-u3-w44-o14-h300cm",
+    ]
+    assert main(asked(tmp_path, "--seed", "1")) == 2
     assert capsys.readouterr().err.count("\n") == 1
-    assert main([*command, "--option", "speed"]) == 2
+    assert main(asked(tmp_path, "--option", "speed")) == 2
+
+
+def test_what_is_shown_is_what_the_function_gives_and_its_row_is_in_the_store(shown, tmp_path):
+    assert main(asked(tmp_path, "--seed", "3")) == 0
+    found = Demonstrations.load(tmp_path)
+    np.testing.assert_array_equal(found.observation, shown.observation)
+    assert found.missions == shown.missions
+    (row,) = flights_in(tmp_path)
+    assert (row.steps, row.seed, row.label) == (shown.missions[0]["steps"], 3, "nearest-waypoint")
+    assert row.episode_return == pytest.approx(shown.reward.sum())
+
+
+def test_files_of_another_planner_are_not_read_once_it_is_overwritten(tmp_path):
+    assert main(asked(tmp_path, "generated:900000")) == 0
+    assert main(asked(tmp_path, "--overwrite", planner="hover")) == 0
+    assert len(list(tmp_path.glob("*.npz"))) == 2, "foreign files are left alone"
+    (mission,) = Demonstrations.load(tmp_path).missions
+    assert (mission["scenario"], mission["planner"]) == ("open_field", "hover")
+    (tmp_path / "open_field.npz").unlink()
+    with pytest.raises(InputError, match=r"open_field\.npz"):
+        Demonstrations.load(tmp_path)
+
+
+def test_a_mission_that_a_planner_refuses_is_a_row_and_no_file(tmp_path, capsys, monkeypatch):
+    (tmp_path / "refusing_planner.py").write_text(
+        "class Refuses:\n"
+        "    def reset(self, brief, seed):\n"
+        "        raise ValueError('no map of this place')\n\n"
+        "    def act(self, swarm):\n"
+        "        return {}\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert main(asked(tmp_path / "out", planner="refusing_planner:Refuses")) == 1
+    assert "no map of this place" in capsys.readouterr().err
+    assert [one.status for one in flights_in(tmp_path / "out")] == ["failed"]
+    with pytest.raises(InputError, match="holds no demonstrations"):
+        Demonstrations.load(tmp_path / "out")
+
+
+def test_a_folder_of_version_0_3_is_read_and_not_gone_on_with(shown, tmp_path, capsys):
+    (tmp_path / "open_field.npz").write_bytes(written(shown))
+    (tmp_path / "demonstrations.json").write_text("{}")
+    assert Demonstrations.load(tmp_path).missions == shown.missions
+    assert main(asked(tmp_path)) == 2
+    assert "holds demonstrations.json of version 0.3.0 or older" in capsys.readouterr().err

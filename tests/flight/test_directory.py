@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Decision, Flight, rollout, summary
+from uas_coverage_env.flight import Decision, Flight, rollout
 from uas_coverage_env.flight.directory import FLIGHT_COLUMNS
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.world import Velocity, Wrench
 
 FILES = {

@@ -10,7 +10,8 @@ import pytest
 from uas_coverage_env import Flight, generate_scenario, load_scenario, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, covered_at, fly_sorties, sorties_summary
+from uas_coverage_env.flight import covered_at, fly_sorties, sorties_summary
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import warnings
 
 

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
-import polars
 import pytest
+from leaderboard_rows import flights_in
 
-from uas_coverage_env.leaderboard import STORE, TIMES
+from uas_coverage_env.runner import STORE
 
 KILLS = 5
 PLANNERS = "hover,nearest-waypoint,random-walk"
@@ -24,7 +24,6 @@ DEADLINE_S = 120.0
 # imports and compiles once, then forks: a line of input is a command line, the answer a process
 NURSERY = """
 import os, shlex, sys
-import polars
 from uas_coverage_env import rollout
 from uas_coverage_env.cli import main
 for planner in ("hover", "nearest-waypoint", "random-walk"):
@@ -72,13 +71,6 @@ def count(out: Path) -> int:
             return reader.execute("SELECT count(*) FROM flights").fetchone()[0]
     except sqlite3.OperationalError:  # not made yet
         return 0
-
-
-def result(out: Path) -> polars.DataFrame:
-    """All that was published of the flights, apart from times."""
-    frame = polars.read_parquet(out / "flights.parquet")
-    # somebody may edit the source while the test runs
-    return frame.drop(*TIMES, "source_sha256")
 
 
 def children(process: int) -> set[int]:
@@ -139,6 +131,6 @@ def test_five_kills_at_random_moments_change_nothing(nursery, two_yards, tmp_pat
     started(nursery, two_yards, tmp_path / "calm", jobs=1)
     assert ended(nursery) == 0
     assert count(killed) == total
-    assert result(killed).equals(result(tmp_path / "calm"))
+    assert flights_in(killed) == flights_in(tmp_path / "calm")
     with closing(sqlite3.connect(killed / STORE)) as store:
         assert store.execute("PRAGMA integrity_check").fetchall() == [("ok",)]

@@ -1,9 +1,7 @@
 """What the rows say about a planner."""
 
-import dataclasses
 import json
 
-import polars
 import pytest
 from leaderboard_rows import failed_row, row
 from small_worlds import meadow, waypoint
@@ -11,22 +9,26 @@ from small_worlds import meadow, waypoint
 from uas_coverage_env.cli import compare
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import Figure
 from uas_coverage_env.leaderboard import (
     Comparison,
+    Row,
     bounds_of,
     leaderboard_figure,
     published,
     scores_of,
     write,
 )
+from uas_coverage_env.leaderboard.row import FLOWN
+from uas_coverage_env.leaderboard.scores import Flights, Scores, _of_figure
 from uas_coverage_env.leaderboard.table import (
     NOTHING,
-    effort_cells,
+    cells,
     markdown,
     notes,
-    outcome_cells,
     scenarios_cells,
 )
+from uas_coverage_env.runner import Workers, opened
 
 
 def by_label(rows, reference="base"):
@@ -65,7 +67,7 @@ def test_what_the_filter_replaced_is_averaged_over_the_flights_there_are():
     ]
     assert by_label(rows)["p"].filtered_percent == pytest.approx(15.0)
     nothing = by_label([row("a", "base"), failed_row("a", "p")])["p"]
-    assert nothing.filtered_percent == 0.0
+    assert nothing.filtered_percent is None
 
 
 def test_energy_per_percent_leaves_out_planners_that_covered_nothing():
@@ -108,9 +110,9 @@ def test_a_reference_that_has_not_flown_yet_leaves_the_comparison_empty():
 
 def test_cells_say_nothing_where_there_is_nothing_to_say():
     rows = [failed_row("a", "p"), row("a", "q|r", violations=1, accomplished=False)]
-    headings, cells = outcome_cells(scores_of(rows, "p"))
-    text = markdown((headings, cells))
-    assert all(len(line) == len(headings) for line in cells)
+    headings, lines = cells(scores_of(rows, "p"), "outcome")
+    text = markdown((headings, lines))
+    assert all(len(line) == len(headings) for line in lines)
     assert "nan" not in text
     assert r"q\|r" in text
     assert scenarios_cells(rows, ["p", "q|r", "s"])[1] == [["a", "failed", "violation", NOTHING]]
@@ -123,8 +125,8 @@ def test_energy_is_compared_with_the_bound_where_there_is_one():
     assert scores["p"].above_bound_percent.value == pytest.approx(35.0)
     assert scores["p"].above_bound_percent.n == 2
     assert scores["q"].above_bound_percent.value is None
-    headings, cells = effort_cells(list(scores.values()))
-    assert cells[0][headings.index("above the bound, %")].startswith("35.0")
+    headings, lines = cells(list(scores.values()), "effort")
+    assert lines[0][headings.index("above the bound, %")].startswith("35.0")
 
 
 def test_accomplished_lpv_flights_have_a_bound():
@@ -136,7 +138,7 @@ def test_accomplished_lpv_flights_have_a_bound():
         row("elsewhere"),
     ]
     told = []
-    bounds = bounds_of(rows, {"meadow": mission}, told=lambda *counts: told.append(counts))
+    bounds = bounds_of(rows, {"meadow": mission}, Workers(1), lambda *counts: told.append(counts))
     assert list(bounds) == [("meadow", 40)]
     assert told == [(0, 1), (1, 1)]
     assert bounds["meadow", 40] > 0.0
@@ -147,7 +149,7 @@ def test_ctrl_c_leaves_out_the_bounds_and_not_what_was_flown(monkeypatch, capsys
         raise KeyboardInterrupt
 
     monkeypatch.setattr(compare, "bounds_of", stopped)
-    assert compare.bounds_shown([row("meadow")], {}, console(), 1) == {}
+    assert compare.bounds_shown([row("meadow")], {}, console(), Workers(1)) == {}
     assert capsys.readouterr().err.startswith("warning: lower bounds: stopped by hand")
 
 
@@ -160,8 +162,6 @@ def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):
     comparison = Comparison.of(rows, 12, "base", "uas-coverage compare ...", "2 flights at a time")
     names = write(comparison, tmp_path)
     assert set(names) <= {path.name for path in tmp_path.iterdir()}
-    flights = polars.read_parquet(tmp_path / "flights.parquet")
-    assert flights.rows() == [dataclasses.astuple(one) for one in rows]
     scores = json.loads((tmp_path / "table.json").read_text())
     assert [one["label"] for one in scores["scores"]] == ["base", "p"]
     assert scores["scores"][0]["energy_Wh"] == {"value": 20.5, "low": 20.0, "high": 21.0, "n": 4}
@@ -208,29 +208,25 @@ def test_the_picture_holds_every_flight_and_every_mean():
     assert means(coverage) == [one.mean_coverage_percent.value for one in scores]
 
 
+def kept(rows, directory):
+    """What `compare` leaves."""
+    with opened(directory, {"command": "compare"}, Row) as store:
+        for one in rows:
+            store.add(one)
+    write(Comparison.of(rows, 3, rows[0].label, "c", "j"), directory)
+
+
 def test_what_is_published_is_read_again(tmp_path):
-    rows = [row("a", "base"), row("b", "base", energy_Wh=None), failed_row("a", "p")]
-    write(Comparison.of(rows, 3, "base", "c", "j"), tmp_path)
+    rows = [row("a", "base"), failed_row("a", "p"), row("b", "base", energy_Wh=None)]
+    kept(rows, tmp_path)
     assert published(tmp_path) == (rows, "base")
 
 
 def test_what_is_no_comparison_of_this_version_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"flights\.parquet: cannot be read"):
+    with pytest.raises(InputError, match="holds no flights that can be read"):
         published(tmp_path)
-    rows = [row("a", "base")]
-    write(Comparison.of(rows, 1, "base", "c", "j"), tmp_path)
-    flights, table = tmp_path / "flights.parquet", tmp_path / "table.json"
-    good = flights.read_bytes()
-    flights.write_bytes(b"no parquet")
-    with pytest.raises(InputError, match=r"flights\.parquet: cannot be read"):
-        published(tmp_path)
-    polars.read_parquet(good).drop("fallbacks").write_parquet(flights)
-    with pytest.raises(InputError, match="other columns than this version writes"):
-        published(tmp_path)
-    polars.read_parquet(good).clear().write_parquet(flights)
-    with pytest.raises(InputError, match="no flight"):
-        published(tmp_path)
-    flights.write_bytes(good)
+    kept([row("a", "base")], tmp_path)
+    table = tmp_path / "table.json"
     table.write_text('{"reference": "nobody"}')
     with pytest.raises(InputError, match="'nobody' has no flight"):
         published(tmp_path)
@@ -250,25 +246,8 @@ def test_the_return_is_that_of_all_flights_there_are_and_says_of_how_many():
     one = by_label(rows, "p")["p"]
     assert (one.episode_return.value, one.episode_return.n) == (20.0, 2)
     assert one.flat()["episode_return_high"] == 30.0
-    headings, (cells,) = outcome_cells([one])
-    assert cells[headings.index("return")] == "20.0 [10.0, 30.0]"
-
-
-def test_a_comparison_of_a_version_that_called_labels_players_can_still_be_drawn(tmp_path):
-    write(Comparison.of([row("a", "p")], 1, "p", "a command", "1"), tmp_path)
-    file = tmp_path / "flights.parquet"
-    polars.read_parquet(file).rename({"label": "player"}).write_parquet(file)
-    rows, reference = published(tmp_path)
-    assert [one.label for one in rows] == [reference] == ["p"]
-
-
-def test_a_comparison_of_a_version_without_returns_can_still_be_drawn(tmp_path):
-    write(Comparison.of([row("a", "p")], 1, "p", "a command", "1"), tmp_path)
-    file = tmp_path / "flights.parquet"
-    polars.read_parquet(file).drop("episode_return").write_parquet(file)
-    rows, reference = published(tmp_path)
-    assert [one.episode_return for one in rows] == [None]
-    assert leaderboard_figure(scores_of(rows, reference), rows, reference).axes
+    headings, (line,) = cells([one], "outcome")
+    assert line[headings.index("return")] == "20.0 [10.0, 30.0]"
 
 
 def test_a_note_names_the_planners_that_fly_alike_with_every_seed():
@@ -279,3 +258,34 @@ def test_a_note_names_the_planners_that_fly_alike_with_every_seed():
     ]
     assert notes(rows, "same")[-1].endswith("one suffices: same.")
     assert not any("suffices" in line for line in notes(rows[:1], "same"))
+
+
+@pytest.mark.parametrize(
+    ("figure", "value", "cell"),
+    [
+        (Figure("spare_Wh", float, len, ""), 2.0, "2.00 [1.00, 3.00]"),
+        (Figure("spare_share", float, len, ""), 200.0, "200.0 [100.0, 300.0]"),
+        (Figure("spare_Wh", float, len, "", over="total"), 4.0, "4.00"),
+        (Figure("spare_Wh", float, len, "", over="most", digits=0), 3.0, "3"),
+        (Figure("spare_Wh", float, len, "", over="least"), 1.0, "1.00"),
+        (Figure("wait_s", float, len, "", over="average", unit="ms"), 2000.0, "2000"),
+        (Figure("spares", int, len, "", over="total"), 4, "4"),
+        (Figure("spares", int, len, "", over="median"), 2.0, "2.0"),
+        (Figure("spare", bool, len, ""), 4, "4/2"),
+    ],
+)
+def test_a_figure_is_summed_up_over_flights_as_it_says(figure, value, cell):
+    class Flown:
+        status, spares = FLOWN, 0
+
+        def __init__(self, found):
+            self.found = found
+
+        def __getattr__(self, name):
+            return self.found
+
+    column = _of_figure(figure)
+    rows = [[Flown(1.0), Flown(3.0)]]
+    found = column.of(Flights(rows, rows, "seeds", "seeds", {}))
+    assert getattr(found, "value", found) == value
+    assert column.cell(Scores("p", {column.name: found, "flights": 2})) == cell

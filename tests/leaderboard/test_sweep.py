@@ -13,15 +13,14 @@ from uas_coverage_env.leaderboard import (
     SETS,
     TIMES,
     Sweep,
-    fly,
-    kept_as,
     planner_specs_of,
     scenarios_of,
     source_of,
 )
+from uas_coverage_env.leaderboard.flying import fly, kept_as
 from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
-from uas_coverage_env.leaderboard.sweep import difference
+from uas_coverage_env.runner.store import difference
 from uas_coverage_env.scenario import load_scenario
 
 PLAIN = st.recursive(
@@ -157,17 +156,8 @@ def test_a_planner_can_fly_twice_under_labels():
     }
 
 
-def test_a_difference_is_named_where_it_lies():
-    kept = {"seeds": "0:2", "planners": {"tour": {"options": {"time_s": 1.0}}, "hover": {}}}
-    asked = {"seeds": "0:2", "planners": {"tour": {"options": {"time_s": 2.0}}, "hover": {}}}
-    assert difference(kept, kept) == ""
-    assert difference(kept, asked) == "planners: tour: options: time_s is 1.0 there, 2.0 asked for"
-    assert difference(kept, {"seeds": "0:2"}) == "it has planners, which is not asked for"
-    assert difference({"seeds": "0:2"}, kept) == "it has no planners"
-
-
 def test_the_source_is_that_of_the_world_and_of_the_planner():
-    hover = planner_specs_of(["hover"], []).values()
+    hover = list(sweep("corridor", "hover").entries())
     assert source_of(hover) == source_of(hover) != source_of([])
 
 
@@ -175,13 +165,14 @@ def test_a_flight_is_kept_where_that_is_asked_for(tmp_path):
     some = sweep("corridor", "hover")
     short = next(iter(some.scenarios.values())).model_copy(update={"max_steps": 2})
     (entry,) = Sweep({"corridor": short}, some.planners, range(7, 8)).entries()
-    row = fly(entry, "")
-    assert list(tmp_path.iterdir()) == []
-    assert dataclasses.replace(fly(entry, "", tmp_path), **dict.fromkeys(TIMES)) == (
-        dataclasses.replace(row, **dict.fromkeys(TIMES))
-    )
-    assert kept_as(entry) == kept_as(row) == "corridor-hover-7"
-    kept = Flight.load(tmp_path / "corridor-hover-7")
+    row, files = fly(entry, "")
+    assert files == {}
+    found = fly(entry, "", "flight")
+    same = dict.fromkeys(TIMES)
+    assert dataclasses.replace(found.row, **same) == dataclasses.replace(row, **same)
+    assert kept_as(entry) == kept_as(row) == "flights/corridor-hover-7"
+    found.write(tmp_path)
+    kept = Flight.load(tmp_path / kept_as(entry))
     assert (kept.x == rollout(short, "hover", seed=7).x).all()
 
 

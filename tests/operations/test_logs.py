@@ -21,7 +21,8 @@ from test_export import random_flight
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, covered_at, rest_of
+from uas_coverage_env.flight import covered_at, rest_of
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.operations import LocalFrame, flown_flight, read_log
 from uas_coverage_env.operations.flown_way import AT_HOME_M
@@ -69,7 +70,7 @@ def test_an_exported_track_comes_back_as_the_flight_that_it_was(plan, plan_at, t
     arguments = ["--format", "csv", "--out", str(files), "--min-slack", "0", *HERE]
     assert main(["export", plan_at, *arguments]) == 0
     logs = [str(files / f"{name}.csv") for name in plan.names]
-    assert main(["import-log", *logs, "--plan", plan_at, "--out", str(out), *HERE]) == 0
+    assert main(["log", *logs, "--plan", plan_at, "--out", str(out), *HERE]) == 0
     said = capsys.readouterr()
     assert "covered 100%" in said.out
     assert "estimated" not in said.out + said.err
@@ -225,7 +226,7 @@ def test_data_flash_logs_become_a_flight(plan, plan_at, tmp_path, capsys):
         bin_log(path, log.time_s, places, first_s=100.0 + 50.0 * i)
         paths.append(f"{name}={path}")
     out = tmp_path / "flown"
-    assert main(["import-log", *paths, "--plan", plan_at, "--out", str(out), *HERE]) == 0
+    assert main(["log", *paths, "--plan", plan_at, "--out", str(out), *HERE]) == 0
     capsys.readouterr()
     flight = Flight.load(out)
     assert flight.covered[-1] == plan.covered[-1]
@@ -264,7 +265,7 @@ def test_recorded_flights_of_an_autopilot_come_home_and_are_judged(tmp_path, cap
         path.write_text(text)
         logs.append(str(path))
     out = tmp_path / "flown"
-    assert main(["import-log", *logs, "--plan", str(tmp_path / "plan"), "--out", str(out)]) == 0
+    assert main(["log", *logs, "--plan", str(tmp_path / "plan"), "--out", str(out)]) == 0
     capsys.readouterr()
     flight = Flight.load(out)
     for k in (0, 1):
@@ -305,7 +306,7 @@ def test_a_log_that_cannot_be_meant_is_refused_in_one_line(case, plan_at, tmp_pa
     if text is not None:
         path.write_text(text)
     arguments = [str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert said in err
@@ -332,7 +333,7 @@ def test_a_file_that_is_no_log_is_refused_in_one_line(case, plan_at, tmp_path, c
     path.write_text(f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n" * 20 if "csv" not in name else
                     f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n")  # fmt: skip
     arguments = [str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     assert said in capsys.readouterr().err
 
 
@@ -340,5 +341,5 @@ def test_two_logs_of_one_uas_are_refused(plan, plan_at, tmp_path, capsys):
     path = tmp_path / "uas_1.csv"
     path.write_text(f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n")
     arguments = [str(path), str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     assert "is a second log of uas_1" in capsys.readouterr().err

@@ -96,7 +96,7 @@ def test_figure_draws_trainings_and_comparisons_too(trained, capsys):
         (["flown", "--kind", "training"], "flown: is the directory of a flight"),
         (["flown", "--kind", "leaderboard"], "draw map, battery, modes, decision-time"),
         (["trained", "--kind", "battery"], "trained: is the directory of a training"),
-        ([".", "--kind", "leaderboard"], "no directory of a comparison: it has no flights.parquet"),
+        ([".", "--kind", "leaderboard"], "no directory of a comparison: it has no table.json"),
         (["flown", "trained", "--kind", "map"], "--kind map shows one directory; 2 were given"),
         (["trained", "trained", "--kind", "training"], "a directory is given twice"),
         (["trained", "gone", "--kind", "training"], "gone: there is no such directory"),

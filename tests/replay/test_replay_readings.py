@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow
 
-from uas_coverage_env.flight import DecisionRecord, SceneHistory, load_planner, rollout
-from uas_coverage_env.flight.record import EventRecord
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.record import DecisionRecord, EventRecord
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.replay.flight_data import flight_data
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.replay.safety_data import FAR_M, floors_m, rooms
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 
 def marks(flight, kind):

@@ -12,7 +12,7 @@ from uas_coverage_baselines.reproduction.published import paper_named
 from uas_coverage_env import Flight
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import flights_in
-from uas_coverage_env.scenario import flood_village
+from uas_coverage_env.scenario.families.flood_village import flood_village
 
 SOON = {"horizon": 8, "teams": 1, "deterministic": True, "threads": 1, "return_rule": "vehicle"}
 
@@ -76,7 +76,7 @@ def test_flights_of_three_steps_are_written_beside_the_paper_and_leave_every_tol
     assert flights_in(out) == flown
     other = reproduce("--quick", "--steps", 4, "--seeds", "5:7", "--out", out)
     assert isinstance(other.exception, InputError)
-    assert "holds another sweep" in str(other.exception)
+    assert "holds the flights of another command" in str(other.exception)
 
 
 def test_seeds_that_are_none_are_refused_before_anything_is_flown(tmp_path):

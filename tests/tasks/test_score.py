@@ -1,18 +1,19 @@
 """Scores: one formula, anchors that are published, a folder that a kill does not harm."""
 
-import json
-import math
+import dataclasses
 
 import numpy as np
 import pytest
+from leaderboard_rows import flights_in, row
 
-from uas_coverage_env import InputError
 from uas_coverage_env.cli import main
-from uas_coverage_env.flight import Episode
-from uas_coverage_env.tasks import LEVELS, anchors_of, level_named, mission_value, score, seeds_of
+from uas_coverage_env.cli import score as command
+from uas_coverage_env.files.errors import PlannerError
+from uas_coverage_env.flight.metrics import available_Wh
+from uas_coverage_env.leaderboard import flying
+from uas_coverage_env.tasks import LEVELS, level_named, score, seeds_of
 from uas_coverage_env.tasks import scoring as module
-from uas_coverage_env.tasks.scoring import MissionScore, available_Wh, scored
-from uas_coverage_env.tasks.store import FILE, ScoreStore
+from uas_coverage_env.tasks.scoring import MissionScore, anchors_of, scored
 from uas_coverage_env.tasks.table import cells, markdown
 
 
@@ -21,26 +22,18 @@ def mission(seed, value, **changes):
         "episode_return": 1.0, "coverage": 1.0, "energy_share": 0.2, "lost": 0, "home": 1,
         "n_uas": 1, "steps": 9,
     }  # fmt: skip
-    return MissionScore(seed=seed, value=value, **(usual | changes))
-
-
-def episode(**changes):
-    usual = {
-        "seed": 0, "scenario": "", "episode_return": 0.0, "reward_terms": {}, "coverage": 1.0,
-        "energy_Wh": 0.0, "steps": 1, "n_uas": 1, "home": 1, "lost": 0, "breaches": 0,
-        "accomplished": True,
-    }  # fmt: skip
-    return Episode(**(usual | changes))
+    return MissionScore(seed, value, usual | changes)
 
 
 def test_the_value_of_a_mission_is_its_formula():
-    scenario = level_named("easy").scenario(seeds_of("test")[0])
-    all_Wh = available_Wh(scenario)
-    value, share = mission_value(episode(coverage=0.5, energy_Wh=0.4 * all_Wh), scenario)
-    assert share == pytest.approx(0.4)
-    assert value == pytest.approx(0.5 * (1.0 - 0.2))
-    assert mission_value(episode(home=0, lost=1), scenario)[0] == 0.0
-    assert mission_value(episode(coverage=0.0), scenario)[0] == 0.0
+    def value(**figures):
+        return MissionScore.of(row(energy_share=0.4, **figures)).value
+
+    assert value(coverage=0.5) == pytest.approx(0.5 * (1.0 - 0.2))
+    assert value(coverage=0.0) == value(home=0) == 0.0
+    assert MissionScore.of(row(n_uas=2, home=1, energy_share=7.0)).value == 0.25, (
+        "energy counts for half at most"
+    )
 
 
 def test_what_batteries_may_give_is_what_they_give_in_flight():
@@ -79,14 +72,17 @@ def test_the_interval_of_several_trainings_is_over_trainings(monkeypatch):
     assert (found.low, found.high) == (pytest.approx(0.25), pytest.approx(0.75))
 
 
-def test_a_policy_is_scored_and_what_is_known_is_not_flown_again():
-    flown = []
-    first = score(lambda seen: 0, "easy", missions=1, split="validation", on_mission=flown.append)
-    assert [one.seed for one in flown] == [seeds_of("validation")[0]]
-    assert first.missions[0].coverage == 1.0
-    assert first.missions[0].home == 1
-    again = score(lambda seen: 1 / 0, "easy", missions=1, split="validation", known=first.missions)
-    assert again == first
+def test_a_policy_is_scored_and_each_mission_is_told():
+    told = []
+    found = score(lambda seen: 0, "easy", missions=1, split="validation", on_mission=told.append)
+    assert [one.seed for one in told] == [seeds_of("validation")[0]]
+    assert found.missions == tuple(told)
+    assert (told[0].coverage, told[0].home) == (1.0, 1)
+
+
+def test_what_a_policy_raises_reaches_who_scores_it():
+    with pytest.raises(PlannerError, match=r"ZeroDivisionError.*test_score\.py"):
+        score(lambda seen: 1 / 0, "easy", missions=1, split="validation")
 
 
 def test_a_random_policy_repeats():
@@ -108,48 +104,6 @@ def test_what_cannot_be_scored_is_refused(arguments, reason):
         score(**{"planner": "hover", "level": "easy", **arguments})
 
 
-def test_a_folder_of_scores_goes_on_after_a_kill(tmp_path):
-    store = ScoreStore(tmp_path)
-    seeds = seeds_of("test")
-    for seed in seeds[:2]:
-        store.add("easy", "mine", mission(seed, 0.5))
-    path = tmp_path / FILE
-    path.write_text(path.read_text() + '{"level": "ea')  # a kill in the middle of a line
-    again = ScoreStore(tmp_path)
-    assert again.missions("easy", "mine") == store.missions("easy", "mine")
-    again.add("easy", "mine", mission(seeds[2], 0.25))
-    assert len(path.read_text().splitlines()) == 3
-    assert ScoreStore(tmp_path).missions("easy", "mine")[2].value == 0.25
-    assert ScoreStore(tmp_path).planners("easy") == ("mine",)
-
-
-def test_scores_of_a_version_that_said_player_are_read(tmp_path):
-    flown = mission(seeds_of("test")[0], 0.5)
-    ScoreStore(tmp_path).add("easy", "mine", flown)
-    path = tmp_path / FILE
-    path.write_text(path.read_text().replace('"planner"', '"player"'))
-    assert ScoreStore(tmp_path).missions("easy", "mine") == (flown,)
-
-
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        ({"value": "much"}, "value is 'much'"),
-        ({"value": math.nan}, "value is nan"),
-        ({"seed": -1}, "mission -1 of easy is another one"),
-        ({"level": "none"}, "level is 'none'"),
-        ({"scenario_sha256": "0"}, "is another one now"),
-        ({"surplus": 1}, "no scored mission"),
-    ],
-)
-def test_a_damaged_line_is_refused_by_its_number(tmp_path, change, reason):
-    ScoreStore(tmp_path).add("easy", "mine", mission(seeds_of("test")[0], 0.5))
-    path = tmp_path / FILE
-    path.write_text(json.dumps(json.loads(path.read_text()) | change) + "\n")
-    with pytest.raises(InputError, match=f"line 1.*{reason}"):
-        ScoreStore(tmp_path)
-
-
 def test_a_table_has_the_best_planner_first():
     scores = {
         "worse": scored("easy", [mission(1, 0.1, home=0)]),
@@ -159,24 +113,87 @@ def test_a_table_has_the_best_planner_first():
     assert "| 1 of 1 |" in markdown(scores)
 
 
+def asked(out, *more, planners="hover"):
+    words = ["score", "--level", "easy", "--planners", planners, "--split", "validation"]
+    return [*words, "--missions", "2", "--jobs", "1", "--out", str(out), *more]
+
+
 def test_the_command_prints_a_table_and_flies_nothing_twice(tmp_path, capsys, monkeypatch):
-    asked = ["score", "--level", "easy", "--planners", "hover", "--missions", "1"]
-    asked += ["--split", "validation", "--out", str(tmp_path)]
-    assert main(asked) == 0
-    first = capsys.readouterr().out
-    assert "UASCoverage/Easy-v0, validation missions" in first
+    assert main(asked(tmp_path)) == 0
+    first = capsys.readouterr().out.partition("UASCoverage")[2]
+    assert first.startswith("/Easy-v0, validation missions")
     assert "| hover |" in first
-    monkeypatch.setattr(module, "evaluate", lambda *args, **more: 1 / 0)
-    assert main(asked) == 0
-    assert capsys.readouterr().out == first
+    monkeypatch.setattr(flying, "rollout", lambda *args, **more: 1 / 0)
+    assert main(asked(tmp_path)) == 0
+    assert capsys.readouterr().out.partition("UASCoverage")[2] == first
 
 
-def test_the_former_name_of_the_option_says_what_it_is_called_now(tmp_path, capsys):
-    asked = ["score", "--level", "easy", "--missions", "1", "--split", "validation"]
-    assert main([*asked, "--players", "hover", "--out", str(tmp_path)]) == 0
-    told = capsys.readouterr()
-    assert "--players is called --planners now" in told.err
-    assert "| hover |" in told.out
+def test_planners_levels_and_missions_are_added_to_a_folder(tmp_path, capsys):
+    assert main(asked(tmp_path)) == 0
+    before = flights_in(tmp_path)
+    assert main(asked(tmp_path, planners="random,hover")) == 0
+    assert "2 of 4 flights are there" in capsys.readouterr().out
+    after = flights_in(tmp_path)
+    assert [one for one in after if one.label == "hover"] == before
+    assert {(one.level, one.label) for one in after} == {("easy", "hover"), ("easy", "random")}
+    mine = [one.episode_return for one in after if one.label == "random"]
+    alone = score("random", "easy", missions=2, split="validation").missions
+    assert mine == [one.episode_return for one in alone]
+
+
+def test_a_planner_that_has_changed_is_not_mixed_with_the_one_of_before(
+    tmp_path, capsys, monkeypatch
+):
+    assert main(asked(tmp_path)) == 0
+    capsys.readouterr()
+    changed = command.spec_of("hover", level_named("easy"))
+    changed = dataclasses.replace(changed, options={"climb_m": 7.0})
+    monkeypatch.setattr(command, "spec_of", lambda name, task: changed)
+    assert main(asked(tmp_path)) == 2
+    said = capsys.readouterr().err
+    assert "flown with another scenario, options, weights or version; give another --out" in said
+    assert main(asked(tmp_path, "--overwrite")) == 0
+
+
+def test_a_mission_that_cannot_be_flown_is_worth_nothing_and_said(tmp_path, capsys, monkeypatch):
+    (tmp_path / "refusing_planner.py").write_text(
+        "class Refuses:\n"
+        "    def reset(self, brief, seed):\n"
+        "        raise ValueError('no map of this place')\n\n"
+        "    def act(self, swarm):\n"
+        "        return {}\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert main(asked(tmp_path / "out", planners="refusing_planner:Refuses")) == 1
+    out, err = capsys.readouterr()
+    assert "no map of this place" in err
+    assert "| refusing_planner:Refuses |" in out
+    assert "| 0.000 | 0.0 | 2 of 2 |" in out
+
+
+def test_the_folder_of_another_command_and_scores_of_0_3_0_are_refused(tmp_path, capsys):
+    (tmp_path / "old" / "test").mkdir(parents=True)
+    (tmp_path / "old" / "test" / "scores.jsonl").write_text("{}")
+    assert main(asked(tmp_path / "old")) == 2
+    assert "holds test/scores.jsonl of version 0.3.0 or older" in capsys.readouterr().err
+    assert (
+        main(
+            [
+                "demonstrate",
+                "open_field",
+                "--planner",
+                "hover",
+                "--jobs",
+                "1",
+                "--out",
+                str(tmp_path / "shown"),
+            ]
+        )
+        == 0
+    )
+    capsys.readouterr()
+    assert main(asked(tmp_path / "shown")) == 2
+    assert "holds the flights of another command" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,167 +1,199 @@
 """`uas-coverage compare`: the benchmark, every pair flown, a table with intervals."""
 
-import shlex
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as ProgressBar
 
-from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
-from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
-from uas_coverage_env.compiled.purpose import compiling_for
+from uas_coverage_env.cli.options import (
+    BackendOption,
+    DynamicsOption,
+    JobsOption,
+    OverwriteOption,
+    command_line,
+)
+from uas_coverage_env.cli.output import console, warn
+from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_others
+from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
+    FLIGHTS,
     FLOWN,
-    Backend,
     Bounds,
     Comparison,
     Entry,
     Row,
-    StoppedError,
-    Store,
     Sweep,
-    WorkerLostError,
     bounds_of,
-    failures,
-    flights_in,
-    fly_all,
-    jobs_of,
-    opened,
+    parquet,
     planner_specs_of,
     scenarios_of,
     seed_range,
-    source_of,
     write,
 )
 from uas_coverage_env.leaderboard import table as tables
+from uas_coverage_env.leaderboard.front import Choice, choices_of, front_cells
+from uas_coverage_env.leaderboard.planner_specs import varied_keys
+from uas_coverage_env.leaderboard.publish import FRONT
+from uas_coverage_env.runner import Store, WorkerLostError, Workers, opened, rows_in
 from uas_coverage_env.scenario import Scenario, warnings
-from uas_coverage_env.simulation import Dynamics
 
 _REFERENCE = "nearest-waypoint"
 _MOST_FLIGHTS = 1_000_000
-_SECONDS_BETWEEN_LINES = 5.0
-_NARROWEST_TABLE = 160
+_WIDEST_TABLE = 1000
+
+
+Scenarios = Annotated[
+    list[str],
+    typer.Option(
+        metavar="WHAT,...",
+        help="`village` or another shipped scenario, scenario files, the sets `dev` and `test` "
+        "(20 generated scenarios each), `generated:SEED`, `generated:FIRST:END`, "
+        "`flood-village:FIRST:END` (maps drawn from the paper's description).",
+    ),
+]
+Planners = Annotated[
+    list[str],
+    typer.Option(
+        metavar="NAME,...",
+        help="Names (see `planner list`) or MODULE:CLASS; LABEL=NAME adds one with other options.",
+    ),
+]
+Out = Annotated[Path, typer.Option(help="Directory of the sweep; resumed if it exists.")]
+Seeds = Annotated[str, typer.Option(metavar="FIRST:END", help="Seeds of the planners.")]
+Options = Annotated[
+    list[str] | None,
+    typer.Option(metavar="PLANNER:KEY=VALUE", help="Option of a planner; may be repeated."),
+]
+Vary = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=A,B,...",
+        help="Fly the planners with each value of an option, and draw time against energy "
+        f"({FRONT}); may be repeated: all combinations. PLANNER:KEY=... varies that of one. "
+        "Each flight is kept in OUT/flights.",
+    ),
+]
+Reference = Annotated[
+    str | None,
+    typer.Option(
+        help=f"The planner that the others are compared with; {_REFERENCE}, or the first.",
+        show_default=False,
+    ),
+]
+Filter = Annotated[
+    bool, typer.Option("--filter", help="Switch the safety filter on for all planners.")
+]
+Check = Annotated[
+    bool,
+    typer.Option(
+        "--check",
+        help="Have each flight judged by the independent checker; what it disagrees with is kept "
+        "in OUT/flights.",
+    ),
+]
+Reuse = Annotated[
+    list[Path] | None,
+    typer.Option(metavar="DIR", help="Reuse the flights that another sweep has in common."),
+]
+Parquet = Annotated[
+    bool, typer.Option("--parquet", help=f"Write {FLIGHTS}, too: the flights (extra `parquet`).")
+]
+NoBounds = Annotated[
+    bool,
+    typer.Option(
+        "--no-bounds", help="Leave out the lower bounds: up to a minute for each mission."
+    ),
+]
 
 
 def compare(
-    scenarios: Annotated[
-        list[str],
-        typer.Option(
-            metavar="WHAT,...",
-            help="`village` or another shipped scenario, scenario files, the sets `dev` and "
-            "`test` (20 generated scenarios each), `generated:SEED`, `generated:FIRST:END`, "
-            "`flood-village:FIRST:END` (maps drawn from the paper's description).",
-        ),
-    ],
-    planners: Annotated[
-        list[str],
-        typer.Option(
-            metavar="NAME,...",
-            help="Names (see `planners`) or MODULE:CLASS; LABEL=NAME adds one with other options.",
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="Directory of the sweep; resumed if it exists.")],
-    seeds: Annotated[
-        str, typer.Option(metavar="FIRST:END", help="Seeds of the planners.")
-    ] = "0:20",
-    option: Annotated[
-        list[str] | None,
-        typer.Option(metavar="PLANNER:KEY=VALUE", help="Option of a planner; may be repeated."),
-    ] = None,
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            help=f"The planner that the others are compared with; {_REFERENCE}, or the first.",
-            show_default=False,
-        ),
-    ] = None,
-    safety_filter: Annotated[
-        bool, typer.Option("--filter", help="Switch the safety filter on for all planners.")
-    ] = False,
-    dynamics: Annotated[
-        Dynamics, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
-    ] = "lpv",
-    backend: Annotated[
-        Backend, typer.Option(help="Processes here, or a Ray cluster (RAY_ADDRESS, else local).")
-    ] = "process",
-    jobs: Annotated[
-        int | None,
-        typer.Option(min=1, help="Flights in parallel; default: one per core.", show_default=False),
-    ] = None,
-    reuse: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="DIR", help="Reuse the flights that another sweep has in common."),
-    ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Delete the flights in --out.")
-    ] = False,
-    no_bounds: Annotated[
-        bool,
-        typer.Option(
-            "--no-bounds", help="Leave out the lower bounds: up to a minute for each mission."
-        ),
-    ] = False,
+    context: typer.Context,
+    scenarios: Scenarios,
+    planners: Planners,
+    out: Out,
+    seeds: Seeds = "0:20",
+    option: Options = None,
+    vary: Vary = None,
+    reference: Reference = None,
+    safety_filter: Filter = False,
+    dynamics: DynamicsOption = "lpv",
+    check: Check = False,
+    backend: BackendOption = "process",
+    jobs: JobsOption = None,
+    reuse: Reuse = None,
+    overwrite: OverwriteOption = False,
+    with_parquet: Parquet = False,
+    no_bounds: NoBounds = False,
 ) -> None:
     """Fly every planner on every scenario with every seed, and compare them.
 
     Ctrl-C or a kill loses no finished flight: the same command goes on. Decision times are those
-    of a machine as busy as `--jobs` makes it. Exits 0 where all flights were flown, 1 where one
-    failed (a planner refused the scenario or crashed) or the sweep was stopped.
+    of a machine as busy as `--jobs` makes it; processor times are not. Exits 0 where all flights
+    were flown, 1 where one failed (a planner refused the scenario or crashed), the check disagrees
+    with one, or the sweep was stopped.
     """
-    sweep = Sweep(
-        scenarios_of(scenarios),
-        planner_specs_of(planners, option or ()),
-        seed_range("--seeds", seeds),
-        dynamics,
-        safety_filter,
-    )
+    specs = planner_specs_of(planners, option or (), vary or ())
+    flown = scenarios_of(scenarios)
+    sweep = Sweep(flown, specs, seed_range("--seeds", seeds), dynamics, safety_filter)
+    reference = _reference(reference, list(sweep.planners))
+    entries, screen = _entries(sweep), console()
+    others = [row for directory in reuse or () for row in rows_in(directory, Row)]
+    if with_parquet:
+        parquet(())  # what is not installed is said before anything is flown
+    asked = {"command": "compare", **sweep.description()}
+    with (
+        Workers(jobs, backend) as workers,
+        opened(out, asked, Row, overwrite=overwrite) as store,
+    ):
+        refuse_others(store, entries)
+        _take(others, entries, store)
+        kept = "flight" if vary else "row"
+        trouble = fly_and_keep(entries, store, workers, screen, kept, check=check)
+        rows = store.rows()
+        skipped = no_bounds or trouble is not None or not rows
+        bounds = {} if skipped else bounds_shown(rows, flown, screen, workers)
+    if not rows:
+        sys.stderr.write("error: nothing was flown\n")
+        end_with(rows, trouble)
+    fronts = _fronts(rows, flown, varied_keys(vary or ()), bounds)
+    command = command_line(context, leave_out=("reuse", "overwrite"))
+    comparison = Comparison.of(rows, len(entries), reference, command, str(workers), bounds, fronts)
+    names = write(comparison, out)
+    if with_parquet:
+        write_files(out, {FLIGHTS: parquet(rows)})
+        names.append(FLIGHTS)
+    _report(screen, comparison, out, names)
+    end_with(rows, trouble)
+
+
+def _entries(sweep: Sweep) -> list[Entry]:
+    """All flights; says what is odd about the scenarios."""
     if sweep.size > _MOST_FLIGHTS:
         raise InputError(
             f"--scenarios, --planners and --seeds ask for {sweep.size} flights; "
             f"give fewer, at most {_MOST_FLIGHTS}"
         )
-    reference = _reference(reference, list(sweep.planners))
-    side_by_side = jobs_of(jobs, backend)
-    command = _command(
-        *("--scenarios", ",".join(scenarios), "--planners", ",".join(planners)),
-        *("--seeds", seeds),
-        *(part for text in option or () for part in ("--option", text)),
-        *(() if reference == _REFERENCE else ("--reference", reference)),
-        *(("--filter",) if safety_filter else ()),
-        *(() if dynamics == "lpv" else ("--dynamics", dynamics)),
-        *(() if backend == "process" else ("--backend", backend)),
-        *(() if jobs is None else ("--jobs", str(jobs))),
-        *(("--no-bounds",) if no_bounds else ()),
-        *("--out", str(out)),
-    )
-    screen = console()
-    entries = list(sweep.entries())
-    others = [row for directory in reuse or () for row in flights_in(directory)]
-    with opened(out, sweep.description(), overwrite=overwrite) as store:
-        _take(others, entries, store)
-        _warn(sweep)
-        source = source_of(sweep.planners.values())
-        trouble = fly_sweep(entries, store, screen, side_by_side, backend, source)
-        rows = store.rows()
-    if not rows:
-        sys.stderr.write(f"error: nothing was flown: {one_line(trouble)}\n")
-        raise typer.Exit(FAILED)
-    how = f"{_all_or(side_by_side)} side by side"
-    bounds = {} if no_bounds else bounds_shown(rows, sweep.scenarios, screen, side_by_side)
-    comparison = Comparison.of(rows, len(entries), reference, command, how, bounds)
-    names = write(comparison, out)
-    _report(screen, comparison, out, names)
-    failed = [row for row in rows if row.status != FLOWN]
-    for line in [*failures(failed), *([trouble] if trouble else [])]:
-        sys.stderr.write(f"error: {one_line(line)}\n")
-    raise typer.Exit(FAILED if failed or trouble else DONE)
+    for name, scenario in sweep.scenarios.items():
+        warn(f"{name}: {warning}" for warning in warnings(scenario))
+    return list(sweep.entries())
+
+
+def _fronts(
+    rows: Sequence[Row], scenarios: Mapping[str, Scenario], keys: Sequence[str], bounds: Bounds
+) -> dict[str, list[Choice]]:
+    """Time against energy of each mission that was accomplished, where options were varied."""
+    found = {}
+    for name, scenario in scenarios.items() if keys else ():
+        mine = [row for row in rows if row.scenario == name]
+        if choices := choices_of(mine, keys, scenario.dt_s, bounds):
+            found[name] = choices
+    return found
 
 
 def _reference(asked: str | None, labels: Sequence[str]) -> str:
@@ -172,7 +204,7 @@ def _reference(asked: str | None, labels: Sequence[str]) -> str:
     return asked
 
 
-def _take(rows: Sequence[Row], entries: Sequence[Entry], store: Store) -> None:
+def _take(rows: Sequence[Row], entries: Sequence[Entry], store: Store[Row]) -> None:
     """Keep the flights of other sweeps that belong to this one, too."""
     lacking = {entry.key for entry in entries} - store.keys()
     for row in rows:
@@ -181,52 +213,8 @@ def _take(rows: Sequence[Row], entries: Sequence[Entry], store: Store) -> None:
             lacking.remove(row.key)
 
 
-def fly_sweep(
-    entries: Sequence[Entry],
-    store: Store,
-    screen: Console,
-    jobs: int,
-    backend: Backend,
-    source_sha256: str,
-    keep: Path | None = None,
-) -> str:
-    """Fly what the store lacks; returns why it did not come to the end, empty where it did.
-
-    Args:
-        entries: All that the sweep flies.
-        store: Where the rows go.
-        screen: Where it shows how far it is.
-        jobs: Flights side by side.
-        backend: Processes here, or Ray.
-        source_sha256: Hash of the source code that flies.
-        keep: Folder that gets each flight's directory; None: none is kept.
-    """
-    kept = store.keys()
-    if kept - {entry.key for entry in entries}:
-        raise InputError(
-            f"{store.path}: was damaged (it holds flights of no sweep, or of another); "
-            "give another --out, or add --overwrite to begin anew"
-        )
-    todo = [entry for entry in entries if entry.key not in kept]
-    if todo and backend == "process":
-        # here and once, not in every process that flies
-        first = todo[0]
-        with compilation_shown(), compiling_for("flights"):
-            compile_flight(first.scenario, return_mode=True, safety_filter=first.safety_filter)
-    try:
-        with _shown(screen, len(entries), len(entries) - len(todo)) as told:
-            for row in fly_all(todo, jobs, backend, source_sha256, keep):
-                store.add(row)
-                told(row)
-    except (KeyboardInterrupt, StoppedError):
-        return "stopped by hand; the same command goes on"
-    except WorkerLostError as error:
-        return f"{error}; the same command goes on"
-    return ""
-
-
 def bounds_shown(
-    rows: Sequence[Row], scenarios: Mapping[str, Scenario], screen: Console, jobs: int
+    rows: Sequence[Row], scenarios: Mapping[str, Scenario], screen: Console, workers: Workers
 ) -> Bounds:
     """The lower bounds of a sweep, up to a minute each; shows how far they are.
 
@@ -243,77 +231,28 @@ def bounds_shown(
                 screen.print(f"lower bounds of {total} scenarios")
 
         try:
-            return bounds_of(rows, scenarios, jobs=jobs, told=told)
-        except KeyboardInterrupt:
-            sys.stderr.write("warning: lower bounds: stopped by hand; the same command goes on\n")
+            return bounds_of(rows, scenarios, workers, told)
+        except (KeyboardInterrupt, WorkerLostError) as error:
+            why = "stopped by hand" if isinstance(error, KeyboardInterrupt) else str(error)
+            sys.stderr.write(f"warning: lower bounds: {why}; the same command goes on\n")
             return {}
-
-
-@contextmanager
-def _shown(screen: Console, total: int, kept: int) -> Iterator[Callable[[Row], object]]:
-    """Show how far the sweep is: gives the function to call with each row."""
-    if not screen.is_terminal:
-        yield _PlainLines(screen, total, kept)
-        return
-    columns = (
-        *(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()),
-        TimeRemainingColumn(),
-    )
-    # long flights and short ones take turns: only a long look back tells the speed
-    with ProgressBar(*columns, console=screen, speed_estimate_period=3600.0) as bar:
-        task = bar.add_task("flying", total=total, completed=kept)
-
-        def told(row: Row) -> None:
-            bar.update(task, description=f"{row.scenario} {row.label} {row.seed}", advance=1)
-
-        yield told
-
-
-class _PlainLines:
-    """One line every few seconds, for logs."""
-
-    def __init__(self, out: Console, total: int, kept: int) -> None:
-        self._out, self._total, self._kept, self._done = out, total, kept, kept
-        self._began = self._last = time.monotonic()
-        out.print(f"{kept} of {total} flights are there" if kept else f"{total} flights to fly")
-
-    def __call__(self, row: Row) -> None:
-        self._done += 1
-        now = time.monotonic()
-        if now - self._last >= _SECONDS_BETWEEN_LINES:
-            self._last = now
-            each_s = (now - self._began) / (self._done - self._kept)
-            left_min = each_s * (self._total - self._done) / 60.0
-            self._out.print(f"{self._done} of {self._total} flights, {left_min:.1f} min left")
-
-
-def _warn(sweep: Sweep) -> None:
-    for name, scenario in sweep.scenarios.items():
-        for warning in warnings(scenario):
-            sys.stderr.write(f"warning: {name}: {one_line(warning)}\n")
 
 
 def _report(screen: Console, comparison: Comparison, out: Path, names: Sequence[str]) -> None:
     rows, scores, reference = comparison.rows, comparison.scores, comparison.reference
     # a truncated table is useless; in a log it is as wide as necessary
-    wide = Console(width=max(screen.width, _NARROWEST_TABLE), highlight=False)
+    wide = Console(width=_WIDEST_TABLE, highlight=False)
     for line in comparison.circumstances():
         screen.print(line, markup=False)
-    wide.print(tables.rich_table(tables.outcome_cells(scores), "\nOutcome"))
-    wide.print(tables.rich_table(tables.effort_cells(scores), "\nEffort"))
+    for name in ("outcome", "effort"):
+        wide.print(tables.rich_table(tables.cells(scores, name), f"\n{name.capitalize()}"))
     if len(scores) > 1 and reference in {one.label for one in scores}:
-        cells = tables.reference_cells(scores, reference)
+        cells = tables.cells(scores, "reference", reference)
         wide.print(tables.rich_table(cells, f"\nAgainst {reference}"))
+    for name, choices in comparison.fronts.items():
+        wide.print(tables.rich_table(front_cells(choices), f"\n{name}: time against energy"))
     for line in tables.notes(rows, reference):
         screen.print(f"\n{line}", markup=False)
     screen.print(f"\n{', '.join(names)} in {out}", markup=False)
     if not any(name.endswith(".png") for name in names):
         screen.print("no picture: python -m pip install 'uas-coverage-env[view]'", markup=False)
-
-
-def _command(*arguments: str) -> str:
-    return shlex.join(["uas-coverage", "compare", *arguments])
-
-
-def _all_or(jobs: int) -> str:
-    return "as many flights as the cluster has cores" if jobs < 0 else f"{jobs} flights"

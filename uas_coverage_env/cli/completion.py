@@ -1,7 +1,8 @@
 """What a shell offers to complete arguments with."""
 
 from uas_coverage_env.flight import planner_names
-from uas_coverage_env.scenario import installed_families, scenario_names
+from uas_coverage_env.scenario import scenario_names
+from uas_coverage_env.scenario.families import installed_families
 
 
 def scenarios(incomplete: str) -> list[str]:

@@ -1,15 +1,17 @@
 """`uas-coverage figure`: a figure of a flight, of a comparison or of trainings, for print."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.leaderboard import FLIGHTS, leaderboard_figure, published, scores_of
+from uas_coverage_env.leaderboard import SCORES, leaderboard_figure, published, scores_of
+from uas_coverage_env.replay.figure_kinds import KINDS, figure_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 _SUFFIXES = (".pdf", ".svg", ".png")
 _MM_PER_IN = 25.4
 _LEADERBOARD, _TRAINING = "leaderboard", "training"
-_FLIGHT_KINDS = "map, battery, modes, decision-time"
+_FLIGHT_KINDS = ", ".join(KINDS)
 
 
 def figure(
@@ -30,8 +32,12 @@ def figure(
         ),
     ],
     kind: Annotated[
-        Literal["map", "battery", "modes", "decision-time", "leaderboard", "training"],
-        typer.Option(help="Figure to draw; map and battery are the paper's Fig. 1 to 3."),
+        str,
+        typer.Option(
+            metavar="KIND",
+            help=f"{_FLIGHT_KINDS}, {_LEADERBOARD} or {_TRAINING}; map and battery are the paper's "
+            "Fig. 1 to 3.",
+        ),
     ],
     step: Annotated[
         int | None, typer.Option(min=0, help="The sample that the map shows; default: the last.")
@@ -60,6 +66,7 @@ def figure(
 
     DIR/KIND.pdf is drawn anew each time; a file that --out names is replaced only on request.
     """
+    check_choice("--kind", kind, (*KINDS, _LEADERBOARD, _TRAINING))
     for directory in directories:
         if not directory.is_dir():
             raise InputError(f"{directory}: there is no such directory")
@@ -70,12 +77,9 @@ def figure(
     if len(directories) > 1 and kind != _TRAINING:
         raise InputError(f"--kind {kind} shows one directory; {len(directories)} were given")
     try:
-        from uas_coverage_env.replay.figures import (
-            CURVE,
-            WIDTH_IN,
-            look,
-            save_figure,
-        )
+        from uas_coverage_env.replay.figures import save_figure
+        from uas_coverage_env.replay.figures.style import WIDTH_IN, look
+        from uas_coverage_env.replay.figures.training import CURVE
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
             raise
@@ -91,7 +95,8 @@ def figure(
 
 
 def _drawn(directories: list[Path], kind: str, step: int | None) -> "Figure":
-    from uas_coverage_env.replay.figures import KINDS, map_figure, training_figure, with_baselines
+    from uas_coverage_env.replay.figures import map_figure, training_figure
+    from uas_coverage_env.replay.figures.training import with_baselines
 
     if kind == _LEADERBOARD:
         rows, reference = published(directories[0])
@@ -100,14 +105,14 @@ def _drawn(directories: list[Path], kind: str, step: int | None) -> "Figure":
         return training_figure(with_baselines(_named(directories)))
     if step is not None:
         return map_figure(Flight.load(directories[0]), step=step)
-    return KINDS[kind](Flight.load(directories[0]))
+    return figure_of(kind)(Flight.load(directories[0]))
 
 
 def _check_sort(directory: Path, kind: str, curve: str) -> None:
     """Whether a directory is of the sort that the kind draws, as far as its files tell."""
-    sorts = {FLIGHTS: "a comparison", curve: "a training", "flight.csv": "a flight"}
-    kinds = {FLIGHTS: _LEADERBOARD, curve: _TRAINING, "flight.csv": _FLIGHT_KINDS}
-    wanted = {_LEADERBOARD: FLIGHTS, _TRAINING: curve}.get(kind, "flight.csv")
+    sorts = {SCORES: "a comparison", curve: "a training", "flight.csv": "a flight"}
+    kinds = {SCORES: _LEADERBOARD, curve: _TRAINING, "flight.csv": _FLIGHT_KINDS}
+    wanted = {_LEADERBOARD: SCORES, _TRAINING: curve}.get(kind, "flight.csv")
     if (directory / wanted).is_file():
         return
     for file, sort in sorts.items():

@@ -1,5 +1,7 @@
 """Commands that are imported when they run: to list them, none of the package's is imported."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
@@ -7,7 +9,11 @@ from typing import Any, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from uas_coverage_env.cli.retired import follower
+from uas_coverage_env.files.errors import InputError
+
 MARKUP = "markdown"
+HELP = {"help_option_names": ["-h", "--help"]}
 
 
 def without_type_of_flags(params: Sequence[Any]) -> list[Any]:
@@ -19,13 +25,15 @@ def without_type_of_flags(params: Sequence[Any]) -> list[Any]:
 
 
 class CommandEntry(NamedTuple):
-    """A command of the command line."""
+    """A command of the command line, or a group of further ones."""
 
     name: str
-    load: Callable[[], Any]
-    """Imports it: a function as typer takes it, or a `typer.Typer` of further commands."""
     summary: str = ""
     """Its line in the list of commands; without one, it is imported for its own."""
+    load: Callable[[], Any] | None = None
+    """Imports it: a function as typer takes it. None: a group."""
+    commands: tuple[CommandEntry, ...] = ()
+    """Of a group."""
 
 
 def at(location: str) -> Callable[[], Any]:
@@ -62,9 +70,16 @@ class LazyGroup(TyperGroup):
         if not isinstance(command, _NotImported) or (self._lists and command.entry.summary):
             return command
         command = _command_of(command.entry)
-        for each in (command, *getattr(command, "commands", {}).values()):
-            without_type_of_flags(each.get_params(ctx))
+        without_type_of_flags(command.get_params(ctx))
         return command
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that is called; what was one once is answered with what follows it."""
+        if ctx.parent is None and args[0] not in self.commands:
+            said = follower(*args[:2])
+            if said:
+                raise InputError(said)
+        return super().resolve_command(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The options of the group."""
@@ -88,10 +103,26 @@ class LazyGroup(TyperGroup):
 
 
 def _command_of(entry: CommandEntry) -> Any:
-    app = made = entry.load()
-    if not isinstance(made, typer.Typer):
+    if entry.load is None:
+        app = typer.Typer(
+            cls=LazyGroup,
+            invoke_without_command=True,
+            add_completion=False,
+            rich_markup_mode=MARKUP,
+        )
+        app.callback(help=entry.summary, context_settings=HELP)(_help_unless_called)
+        group = typer.main.get_command(app)
+        assert isinstance(group, LazyGroup)
+        group.add_entries(entry.commands)
+        command: Any = group
+    else:
         app = typer.Typer(add_completion=False, rich_markup_mode=MARKUP)
-        app.command(entry.name)(made)
-    command = typer.main.get_command(app)
+        app.command(entry.name)(entry.load())
+        command = typer.main.get_command(app)
     command.name = entry.name
     return command
+
+
+def _help_unless_called(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())

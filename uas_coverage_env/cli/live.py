@@ -3,7 +3,7 @@
 from rich.console import Console
 
 from uas_coverage_env.flight import Progress
-from uas_coverage_env.replay import LivePage
+from uas_coverage_env.replay.live import LivePage
 
 
 class LiveView:

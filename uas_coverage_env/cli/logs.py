@@ -1,6 +1,5 @@
-"""`uas-coverage import-log`: what was flown comes back in."""
+"""`uas-coverage log`: what was flown comes back in."""
 
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,15 +10,17 @@ from rich.table import Table
 
 from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.operations import asked_place, extra
-from uas_coverage_env.cli.output import console, one_line
+from uas_coverage_env.cli.options import PlaceOption, ReplaceFlightOption
+from uas_coverage_env.cli.output import console, warn
+from uas_coverage_env.cli.sorties import load_planned
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import Flight, check_directory
+from uas_coverage_env.flight.directory import check_directory
 
 if TYPE_CHECKING:
     from uas_coverage_env.operations.logs import Logged
 
 
-def import_log(
+def log(
     logs: Annotated[
         list[str],
         typer.Argument(
@@ -28,12 +29,14 @@ def import_log(
             "ArduPilot, .ulg of PX4. SYSTEM chooses a vehicle of a .tlog that holds several.",
         ),
     ],
-    plan: Annotated[Path, typer.Option(help="Flight directory whose files were flown.")],
+    plan: Annotated[
+        Path,
+        typer.Option(
+            metavar="EXPORT", help="Directory of the files that were flown, or of their flight."
+        ),
+    ],
     out: Annotated[Path, typer.Option(help="Flight directory to write.")],
-    place: Annotated[
-        str | None,
-        typer.Option(metavar="LAT,LON", help="Of the origin, for a scenario without [place]."),
-    ] = None,
+    place: PlaceOption = None,
     flight: Annotated[
         list[str] | None,
         typer.Option(
@@ -48,16 +51,14 @@ def import_log(
             help="Which battery monitor, from 1 on, of one UAS, or of all; otherwise the first.",
         ),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the flight in --out.")
-    ] = False,
+    overwrite: ReplaceFlightOption = False,
 ) -> None:
     """Make a flight directory from logs of UAS that flew, judged by the rules (extra `ops`)."""
     with extra():
         from uas_coverage_env.operations import LocalFrame, flown_flight
         from uas_coverage_env.operations.export import place_of_flight
     check_directory(out, overwrite=overwrite)
-    planned = Flight.load(plan)
+    planned = load_planned(plan)
     scenario = planned.scenario
     there = place_of_flight(planned, asked_place(place))
     numbers = _chosen("--flight", flight, planned.names)
@@ -81,8 +82,7 @@ def import_log(
             )
     screen.print(table)
     screen.print(f"beside its plan: uas-coverage replay {plan} {out}", markup=False)
-    for note in made.notes:
-        sys.stderr.write(f"warning: {one_line(note)}\n")
+    warn(made.notes)
 
 
 def _chosen(option: str, texts: Sequence[str] | None, names: Sequence[str]) -> dict[str, int]:

@@ -1,6 +1,7 @@
 """How the commands speak: plain lines and tables on stdout, warnings on stderr."""
 
 import sys
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -8,7 +9,7 @@ from rich.console import Console
 if TYPE_CHECKING:
     from uas_coverage_env.scenario import Scenario
 
-DONE, FAILED = 0, 1
+DONE, FAILED, REFUSED = 0, 1, 2
 
 
 def console(*, quiet: bool = False) -> Console:
@@ -25,6 +26,12 @@ def one_line(text: str) -> str:
     return " ".join(text.split())
 
 
+def warn(lines: Iterable[str]) -> None:
+    """Say on stderr what is doubtful, a line each."""
+    for line in lines:
+        sys.stderr.write(f"warning: {one_line(line)}\n")
+
+
 def loaded(name_or_path: str) -> "Scenario":
     """Load a scenario; what is doubtful about it goes to stderr, a line each."""
     from uas_coverage_env.scenario import (  # a second that help need not take
@@ -33,6 +40,5 @@ def loaded(name_or_path: str) -> "Scenario":
     )
 
     scenario = load_scenario(name_or_path)
-    for warning in warnings(scenario):
-        sys.stderr.write(f"warning: {one_line(warning)}\n")
+    warn(warnings(scenario))
     return scenario

@@ -19,7 +19,7 @@ GROUP = "uas_coverage.commands"
 def plugin_entries() -> list[CommandEntry]:
     """Them all; one that cannot be loaded says so when it is called, and harms no other."""
     entries = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
-    return [CommandEntry(entry.name, _loader(entry)) for entry in entries]
+    return [CommandEntry(entry.name, load=_loader(entry)) for entry in entries]
 
 
 def _loader(entry: EntryPoint) -> Callable[[], Any]:

@@ -1,23 +1,26 @@
 """What a person sees while a flight is computed: a line that changes, or lines now and then."""
 
+import itertools
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 
 from rich.console import Console, Group
 from rich.live import Live
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as ProgressBar
 from rich.spinner import Spinner
 
 from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.compilation import compilation_shown
 from uas_coverage_env.cli.live import LiveView
 from uas_coverage_env.cli.watch import FlightWindow
-from uas_coverage_env.draw import NoDisplayError
+from uas_coverage_env.draw.window import NoDisplayError
+from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight import Planner, Progress
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import LANDED, LOST
+from uas_coverage_env.vehicle.layout import DOD
 
 _SECONDS_BETWEEN_LINES = 5.0
 _NO_CHARGE = {LANDED: "landed", LOST: "lost"}
@@ -141,7 +144,45 @@ class _PlainLines:
         self._next = time.monotonic() + _SECONDS_BETWEEN_LINES
 
     def __call__(self, progress: Progress) -> None:
-        now = time.monotonic()
-        if progress.decision_time_s is None or now >= self._next:
+        if progress.decision_time_s is None or self.due():
             self._out.print(progress_line(progress), markup=False)
-            self._next = now + _SECONDS_BETWEEN_LINES
+
+    def due(self) -> bool:
+        """Whether it is time for another line."""
+        now = time.monotonic()
+        if now < self._next:
+            return False
+        self._next = now + _SECONDS_BETWEEN_LINES
+        return True
+
+
+@contextmanager
+def missions_shown(screen: Console, total: int, kept: int) -> Iterator[Callable[[str], object]]:
+    """Show how far many missions are: gives the function to call with the name of each.
+
+    Args:
+        screen: Where.
+        total: Missions.
+        kept: Those that were flown before.
+    """
+    if not screen.is_terminal:
+        screen.print(f"{kept} of {total} flights are there" if kept else f"{total} flights to fly")
+        lines, began, done = _PlainLines(screen), time.monotonic(), itertools.count(kept + 1)
+
+        def line(name: str) -> None:
+            flown = next(done)
+            if lines.due():
+                each_s = (time.monotonic() - began) / (flown - kept)
+                left_min = each_s * (total - flown) / 60.0
+                screen.print(f"{flown} of {total} flights, {left_min:.1f} min left")
+
+        yield line
+        return
+    columns = (
+        *(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()),
+        TimeRemainingColumn(),
+    )
+    # long flights and short ones take turns: only a long look back tells the speed
+    with ProgressBar(*columns, console=screen, speed_estimate_period=3600.0) as bar:
+        task = bar.add_task("flying", total=total, completed=kept)
+        yield lambda name: bar.update(task, description=name, advance=1)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from uas_coverage_env.cli.options import FlightDirectory, SecondFlight
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
@@ -12,10 +13,8 @@ from uas_coverage_env.replay import write_gif, write_replay, write_video
 
 
 def replay(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
-    other: Annotated[
-        Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")
-    ] = None,
+    directory: FlightDirectory,
+    other: SecondFlight = None,
     video: Annotated[
         Path | None, typer.Option(metavar="FILE.mp4", help="Write a video too (extra `view`).")
     ] = None,

@@ -1,12 +1,12 @@
-"""`uas-coverage resume`: the rest of a mission that was broken off."""
+"""`uas-coverage scenario resume`: the rest of a mission that was broken off."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from uas_coverage_env.cli.options import ReplaceFileOption, check_new_toml
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight, rest_of
 from uas_coverage_env.flight.record import LANDED, LOST
@@ -15,7 +15,7 @@ from uas_coverage_env.flight.record import LANDED, LOST
 def resume(
     directory: Annotated[
         Path,
-        typer.Argument(metavar="DIR", help="Flight directory, of `run` or of `import-log`."),
+        typer.Argument(metavar="DIR", help="Flight directory, of `run` or of `log`."),
     ],
     out: Annotated[Path, typer.Option(help="Scenario file to write.")],
     from_here: Annotated[
@@ -26,15 +26,10 @@ def resume(
             "start at home with fresh packs.",
         ),
     ] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the file where it exists.")
-    ] = False,
+    overwrite: ReplaceFileOption = False,
 ) -> None:
     """Write the scenario of what a flight has left to cover."""
-    if out.suffix != ".toml":
-        raise InputError(f"--out {out}: should end in .toml")
-    if out.exists() and not overwrite:
-        raise InputError(f"{out}: exists; give another --out or add --overwrite")
+    check_new_toml(out, overwrite=overwrite)
     flight = Flight.load(directory)
     rest = rest_of(flight, from_here=from_here)
     write_atomically(out, rest.file_text().encode())

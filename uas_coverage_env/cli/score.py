@@ -1,18 +1,21 @@
 """`uas-coverage score`: planners and policies on the levels, with scores that can be compared."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from uas_coverage_env.cli.options import BackendOption, JobsOption, OverwriteOption
 from uas_coverage_env.cli.output import console
+from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_former
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
-from uas_coverage_env.flight import load_planner
+from uas_coverage_env.leaderboard import Entry, PlannerSpec, Row
+from uas_coverage_env.runner import Workers, opened
 from uas_coverage_env.tasks.levels import LEVELS
-from uas_coverage_env.tasks.scoring import RANDOM, MissionScore, Score, score
-from uas_coverage_env.tasks.store import ScoreStore
+from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
 from uas_coverage_env.tasks.table import markdown
 from uas_coverage_env.tasks.task import SPLITS
 
@@ -32,49 +35,61 @@ def score_command(
     ] = _PLANNERS,
     missions: Annotated[int, typer.Option(min=1, help="How many of the split.")] = 20,
     split: Annotated[str, typer.Option(help=f"{' or '.join(_SPLITS)}.")] = "test",
-    out: Annotated[Path, typer.Option(help="Folder of the scores; resumed if it exists.")] = Path(
-        "scores"
-    ),
-    players: Annotated[str | None, typer.Option(hidden=True)] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder of the scores; resumed, and added to, if it exists.")
+    ] = Path("scores"),
+    backend: BackendOption = "process",
+    jobs: JobsOption = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Fly the missions of a level and print the scores (docs/levels.md).
 
     Ctrl-C or a kill loses no mission that was flown: the same command goes on. Planners fly with
-    the assistants of the level.
+    the assistants of the level. Exits 1 where a mission could not be flown; it is worth nothing.
     """
-    levels = _named("--level", level)
+    levels, names = _named("--level", level), _named("--planners", planners)
     for name in levels:
         check_choice("--level", name, tuple(LEVELS))
     check_choice("--split", split, _SPLITS)
-    if players is not None:
-        sys.stderr.write("--players is called --planners now\n")
-        planners = players
-    names = _named("--planners", planners)
     if missions > len(SPLITS[split]):
         raise InputError(f"--missions {missions}: --split {split} has {len(SPLITS[split])}")
-    for name in names:
-        if name != RANDOM:
-            load_planner(name)  # a name that is wrong is refused before anything is flown
-    store, screen = ScoreStore(out / split), console()
-    for name in levels:
-        scores: dict[str, Score] = {}
-        for planner in names:
-            scores[planner] = _scored(store, planner, name, missions, split)
+    entries = {
+        name: _entries(name, [spec_of(planner, LEVELS[name]) for planner in names], split, missions)
+        for name in levels
+    }
+    every, screen = [entry for some in entries.values() for entry in some], console()
+    with (
+        Workers(jobs, backend) as workers,
+        opened(out, DESCRIPTION, Row, overwrite=overwrite) as store,
+    ):
+        refuse_former(store, every)
+        trouble = fly_and_keep(every, store, workers, screen)
+        found = {row.key: row for row in store.rows()}
+    for name, some in entries.items():
+        flown: dict[str, list[MissionScore]] = {}
+        for entry in some:
+            if entry.key in found:
+                mission = MissionScore.of(found[entry.key])
+                flown.setdefault(entry.spec.label, []).append(mission)
         screen.print(f"{LEVELS[name].id}, {split} missions", markup=False)
         # a table in a file is not to be wrapped
+        scores = {planner: scored(name, each) for planner, each in flown.items()}
         sys.stdout.write(f"\n{markdown(scores)}\n\n")
+    end_with([found[entry.key] for entry in every if entry.key in found], trouble)
 
 
-def _scored(store: ScoreStore, planner: str, level: str, missions: int, split: str) -> Score:
-    def keep(mission: MissionScore) -> None:
-        store.add(level, planner, mission)
-
-    known = store.missions(level, planner)
-    return score(planner, level, missions=missions, split=split, known=known, on_mission=keep)
+def _entries(level: str, specs: Sequence[PlannerSpec], split: str, missions: int) -> list[Entry]:
+    """The flights of a level, mission by mission: a score under way compares like with like."""
+    scenarios = LEVELS[level].scenarios(split, missions)
+    return [
+        entry_of(spec, LEVELS[level], seed, scenario)
+        for seed, scenario in scenarios.items()
+        for spec in specs
+    ]
 
 
 def _named(option: str, text: str) -> list[str]:
-    names = [name for name in text.split(",") if name]
+    names = list(dict.fromkeys(name for name in text.split(",") if name))
     if not names:
         raise InputError(f"{option} {text!r}: names none; give some, with commas between them")
     return names

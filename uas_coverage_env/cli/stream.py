@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from uas_coverage_env.cli.operations import asked_place, extra
+from uas_coverage_env.cli.options import FlightDirectory, PlaceOption
 from uas_coverage_env.cli.output import FAILED, console
 from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.errors import InputError
@@ -14,7 +15,7 @@ from uas_coverage_env.flight import Flight
 
 
 def stream(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
+    directory: FlightDirectory,
     connect: Annotated[
         list[str],
         typer.Option(
@@ -44,12 +45,9 @@ def stream(
         typer.Option(help="Percent that streaming may take longer than planned, or it is refused."),
     ] = 5.0,
     track: Annotated[
-        Path | None, typer.Option(help="Table of what was flown (.csv), for `import-log`.")
+        Path | None, typer.Option(help="Table of what was flown (.csv), for `log`.")
     ] = None,
-    place: Annotated[
-        str | None,
-        typer.Option(metavar="LAT,LON", help="Of the origin, for a scenario without [place]."),
-    ] = None,
+    place: PlaceOption = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before vehicles arm.")] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace --track where it exists.")

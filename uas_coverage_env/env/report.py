@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from uas_coverage_env.world import ABSENT
+from uas_coverage_env.entities.state import ABSENT
 
 CONTACT, CONTACT_WITH, LIMITS, STATUS, FILTERED, RETURNING, COVERED = range(7)
 """Columns of a report: outcome of the step (LIMITS is a mask, see `vehicle.LIMIT_NAMES`), and how

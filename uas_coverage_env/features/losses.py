@@ -8,7 +8,7 @@ from uas_coverage_env.compiled.kernels import rare_kernel
 from uas_coverage_env.entities.outcome import FAULT, NONE
 from uas_coverage_env.features.event import OfUas, concerns, happens
 from uas_coverage_env.features.feature import Feature, Point
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 
 @rare_kernel

@@ -9,7 +9,8 @@ from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.features.event import OfUas, concerns
 from uas_coverage_env.features.feature import Feature, Point
 from uas_coverage_env.features.true_vehicles import perturb
-from uas_coverage_env.vehicle import LIFT, N_PERTURBATIONS, POWER
+from uas_coverage_env.vehicle.layout import LIFT
+from uas_coverage_env.vehicle.true_vehicle import N_PERTURBATIONS, POWER
 
 
 @rare_kernel

@@ -14,7 +14,8 @@ from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.features.feature import Feature, Point
 from uas_coverage_env.features.table import FeatureTable
 from uas_coverage_env.features.true_vehicles import perturb
-from uas_coverage_env.vehicle import CAPACITY, LIFT, MASS, N_PERTURBATIONS, THRUST
+from uas_coverage_env.vehicle.layout import LIFT
+from uas_coverage_env.vehicle.true_vehicle import CAPACITY, MASS, N_PERTURBATIONS, THRUST
 
 Share = Annotated[float, Field(ge=0.0, le=0.5)]
 

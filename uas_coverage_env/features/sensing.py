@@ -14,7 +14,7 @@ from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.features.event import OfUas, Seconds, concerns, lasts
 from uas_coverage_env.features.feature import Feature, Point
 from uas_coverage_env.features.table import FeatureTable
-from uas_coverage_env.vehicle import DOD, N_STATES, U_TH, VX, VY, X, Y
+from uas_coverage_env.vehicle.layout import DOD, N_STATES, U_TH, VX, VY, X, Y
 
 LONGEST_DELAY = 7
 """Steps by which what is sensed may lag behind."""

@@ -8,22 +8,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
 from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.loop import Progress, rollout
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.runner import STORE, rows_in
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import SwarmState
 
 UNKNOWN_CHOICE = -1
 """The choice where the waypoint that came next was not among those to choose from."""
@@ -41,6 +44,12 @@ _COLUMNS: dict[str, tuple[type, int | None]] = {
     "uas": (np.int64, None),
 }
 """Name -> kind of number, and how many in a row; None: one."""
+
+
+class _Seen(NamedTuple):
+    swarm: SwarmState
+    observation: NDArray[np.float32]
+    candidates: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -93,12 +102,12 @@ class Demonstrations:
 
     @classmethod
     def load(cls, directory: str | Path) -> Self:
-        """Read what `uas-coverage demonstrate` has written; nothing is unpickled.
+        """Read what `uas-coverage planner demonstrate` has written; nothing is unpickled.
 
         Raises:
             InputError: There are none, or a file is damaged; names it.
         """
-        paths = sorted(Path(directory).glob("*.npz"))
+        paths = _files_in(Path(directory))
         if not paths:
             raise InputError(f"{directory}: holds no demonstrations (*.npz)")
         read = [_read(path) for path in paths]
@@ -120,45 +129,60 @@ def demonstrate(scenario: Scenario, planner: Planner | str, seed: int = 0) -> De
         InputError: Unknown planner, or it refuses the scenario.
         PlannerError: The planner raised an exception, or gave commands that cannot be flown.
     """
-    observer = MissionInterface(MissionBrief.of(scenario))
-    seen: list[tuple[SwarmState, NDArray[np.float32], NDArray[np.int64]]] = []
+    watch = Demonstrator(scenario)
+    return watch.shown(rollout(scenario, planner, seed, on_step=watch))
 
-    def look(progress: Progress) -> None:
+
+class Demonstrator:
+    """Watches a flight, as `on_step` of `rollout`, for what a learner can imitate.
+
+    Args:
+        scenario: The mission.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._observer = MissionInterface(MissionBrief.of(scenario))
+        self._seen: list[_Seen] = []
+
+    def __call__(self, progress: Progress) -> None:
+        """See the swarm as learners do."""
         swarm = progress.swarm
-        seen.append((swarm, observer.observe(swarm), observer.candidates.copy()))
+        observation = self._observer.observe(swarm)
+        self._seen.append(_Seen(swarm, observation, self._observer.candidates.copy()))
 
-    flight = rollout(scenario, planner, seed, on_step=look)
-    about = {
-        "scenario": scenario.name,
-        "planner": flight.planner,
-        "planner_options": dict(flight.planner_options),
-        "seed": seed,
-        "steps": flight.steps,
-        "ended": flight.ended,
-        "covered": int(flight.covered[-1]),
-        "waypoints": len(scenario.waypoints),
-        "versions": dict(flight.versions),
-    }
-    swarms = [swarm for swarm, _, _ in seen]
-    next_covered = _next_covered(scenario, swarms)
-    assert flight.reward_terms is not None  # as every rollout keeps them
-    paid = flight.reward_terms.sum(axis=2)
-    rows = [_rows_of(scenario, paid[k], k, seen, next_covered[k]) for k in range(len(seen) - 1)]
-    columns = {name: np.concatenate([row[name] for row in rows]) for name in _COLUMNS}
-    mission = np.zeros(len(columns["step"]), np.int64)
-    return Demonstrations(**columns, mission=mission, missions=(about,))
+    def shown(self, flight: Flight) -> Demonstrations:
+        """The flight that was watched."""
+        scenario, seen = flight.scenario, self._seen
+        about = {
+            "scenario": scenario.name,
+            "planner": flight.planner,
+            "planner_options": dict(flight.planner_options),
+            "seed": flight.seed,
+            "steps": flight.steps,
+            "ended": flight.ended,
+            "covered": int(flight.covered[-1]),
+            "waypoints": len(scenario.waypoints),
+            "versions": dict(flight.versions),
+        }
+        next_covered = _next_covered(scenario, [each.swarm for each in seen])
+        assert flight.reward_terms is not None  # as every rollout keeps them
+        paid = flight.reward_terms.sum(axis=2)
+        rows = [_rows_of(scenario, paid[k], k, seen, next_covered[k]) for k in range(len(seen) - 1)]
+        columns = {name: np.concatenate([row[name] for row in rows]) for name in _COLUMNS}
+        mission = np.zeros(len(columns["step"]), np.int64)
+        return Demonstrations(**columns, mission=mission, missions=(about,))
 
 
 def _rows_of(
     scenario: Scenario,
     paid: NDArray[np.float64],
     k: int,
-    seen: Sequence[tuple[SwarmState, NDArray[np.float32], NDArray[np.int64]]],
+    seen: Sequence[_Seen],
     next_covered: NDArray[np.int64],
 ) -> dict[str, NDArray[Any]]:
     swarm, observation, candidates = seen[k]
     flies = np.flatnonzero(swarm.status == FLYING)
-    after = seen[k + 1][0].x[flies]
+    after = seen[k + 1].swarm.x[flies]
     asked = np.column_stack([after[:, S.VX], after[:, S.VY], -after[:, S.Z]])
     offered = candidates[flies] >= 0
     wanted = next_covered[flies, None]
@@ -210,6 +234,23 @@ def written(demonstrations: Demonstrations) -> bytes:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, about=text, **arrays)
     return buffer.getvalue()
+
+
+@dataclass(frozen=True)
+class _Mission:
+    """What is read of a row of the store."""
+
+    key: str
+    scenario: str
+    status: str
+
+
+def _files_in(directory: Path) -> list[Path]:
+    """The missions that a folder says it holds; of one without a store, all of its files."""
+    if not (directory / STORE).exists():
+        return sorted(directory.glob("*.npz"))
+    missions = rows_in(directory, _Mission)
+    return [directory / f"{one.scenario}.npz" for one in missions if one.status == "flown"]
 
 
 def _read(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight.metrics import summary
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.flight.of_log import STATES
 from uas_coverage_env.flight.record import MODES, FlightRecord
 from uas_coverage_env.scenario import Scenario
@@ -55,6 +55,16 @@ def write_flight(flight: FlightRecord, directory: Path, *, overwrite: bool = Fal
         InputError: See `check_directory`.
     """
     check_directory(directory, overwrite=overwrite)
+    if flight.reward_terms is None:  # those of a former flight are not this one's
+        (directory / REWARD_FILE).unlink(missing_ok=True)
+    if flight.of_log is None:
+        (directory / PASS_FILE).unlink(missing_ok=True)
+    write_files(directory, flight_files(flight))
+    return directory
+
+
+def flight_files(flight: FlightRecord) -> dict[str, bytes]:
+    """The files of a flight, name -> content; the summary last: where it is, the rest is."""
     times = [repr(time) for time in flight.time_s.tolist()]
     texts = {
         **_scenario_files(flight.scenario),
@@ -64,15 +74,9 @@ def write_flight(flight: FlightRecord, directory: Path, *, overwrite: bool = Fal
         **_reward_file(flight, times),
         **_pass_file(flight),
         "run.json": _json(_run(flight)),
-        # the summary last: where it is, the rest is
         "summary.json": _json(summary(flight)),
     }
-    if flight.reward_terms is None:  # those of a former flight are not this one's
-        (directory / REWARD_FILE).unlink(missing_ok=True)
-    if flight.of_log is None:
-        (directory / PASS_FILE).unlink(missing_ok=True)
-    write_files(directory, {name: text.encode() for name, text in texts.items()})
-    return directory
+    return {name: text.encode() for name, text in texts.items()}
 
 
 def _scenario_files(scenario: Scenario) -> dict[str, str]:

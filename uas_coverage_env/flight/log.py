@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import interpreted
-from uas_coverage_env.entities.outcome import FAULT, NONE
+from uas_coverage_env.entities.commands import command_mode
+from uas_coverage_env.entities.outcome import CONTACT_NAMES, FAULT, NONE
+from uas_coverage_env.entities.state import FLYING, SWAPPING
+from uas_coverage_env.entities.state import LOST as IS_LOST
 from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.features.event import OfUas
 from uas_coverage_env.flight.planner import Decision
@@ -29,10 +32,18 @@ from uas_coverage_env.flight.record import (
 )
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import LIMIT_NAMES, N_LIMITS, open_circuit_V, write_limited
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import CONTACT_NAMES, FLYING, SWAPPING, Command, command_mode
-from uas_coverage_env.world import LOST as IS_LOST
+from uas_coverage_env.vehicle.discharge import open_circuit_V
+from uas_coverage_env.vehicle.limits import LIMIT_NAMES, N_LIMITS, write_limited
+from uas_coverage_env.world import Command
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What a decision took: time, and processor time of all threads, where it is known [s]."""
+
+    wall_s: float = 0.0
+    processor_s: float | None = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,7 +98,7 @@ class FlightLog:
         self,
         commands: Mapping[str, Command],
         packed: NDArray[np.void] | None,
-        duration_s: float,
+        took: Taken,
         decision: Decision | None,
         outcome: NDArray[np.void],
     ) -> None:
@@ -101,7 +112,7 @@ class FlightLog:
             for name, returning in zip(names, outcome["returning"], strict=True)
         ]
         filtered = int(outcome["filtered"].sum())
-        record = _decision_record(duration_s, decision, filtered)
+        record = _decision_record(took, decision, filtered)
         plan = _plan_rows(decision, self.steps, names)
         self._covered += int(outcome["newly_covered"].sum())
         step = _Step(outcome, modes, record, plan, paid, self._sample())
@@ -270,12 +281,11 @@ def _plan_rows(decision: Decision | None, step: int, names: tuple[str, ...]) -> 
     return np.concatenate(parts)
 
 
-def _decision_record(duration_s: float, decision: Decision | None, filtered: int) -> DecisionRecord:
-    if decision is None:
-        return DecisionRecord(duration_s, filtered=filtered)
-    gap = decision.mip_gap
-    if gap is not None:
-        # an infinite gap says that there is no bound
-        gap = float(gap) if math.isfinite(gap) else None
-    reason = None if decision.reason is None else str(decision.reason)
-    return DecisionRecord(duration_s, decision.fallback, gap, filtered, reason)
+def _decision_record(took: Taken, decision: Decision | None, filtered: int) -> DecisionRecord:
+    gap = reason = None
+    if decision is not None:
+        if decision.mip_gap is not None and math.isfinite(decision.mip_gap):
+            gap = float(decision.mip_gap)  # an infinite gap says that there is no bound
+        reason = None if decision.reason is None else str(decision.reason)
+    fallback = decision is not None and decision.fallback
+    return DecisionRecord(took.wall_s, fallback, gap, filtered, reason, took.processor_s)

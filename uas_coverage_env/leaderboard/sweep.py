@@ -1,7 +1,7 @@
 """The list of flights to fly: scenarios x planners x seeds, each known by what it is."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from typing import Any
@@ -10,7 +10,7 @@ from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
 from uas_coverage_env.leaderboard.planner_specs import PlannerSpec
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.simulation.world import DynamicsName
 
 PACKAGE = "uas-coverage-env"
 
@@ -20,22 +20,44 @@ class Entry:
     """One flight to fly.
 
     Attributes:
-        key: Hash of all that decides how the flight goes.
-        scenario_sha256: Hash of the scenario.
         scenario: On what it is flown.
+        scenario_sha256: Its hash.
         spec: The planner with its options.
-        seed: The seed of the planner.
+        seed: Of the planner, and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
-        safety_filter: Whether the filter is on, whatever the planner asks for.
+        safety_filter: Whether the world keeps commands clear of harm; None: as the planner asks.
+        return_mode: Whether the world brings UAS home in time; None: as the planner asks.
+        reward_weights: Of the terms whose weights are not the default ones.
+        level: Of which the mission is; empty where of none.
     """
 
-    key: str
-    scenario_sha256: str
     scenario: Scenario
+    scenario_sha256: str
     spec: PlannerSpec
     seed: int
-    dynamics: Dynamics
-    safety_filter: bool
+    dynamics: DynamicsName = "lpv"
+    safety_filter: bool | None = None
+    return_mode: bool | None = None
+    reward_weights: Mapping[str, float] = field(default_factory=dict)
+    level: str = ""
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of all that decides how the flight goes."""
+        return content_hash(
+            {
+                "version": version(PACKAGE),
+                "scenario": self.scenario_sha256,
+                "label": self.spec.label,  # two labels of one planner are two rows
+                **self.spec.identity(),
+                "seed": self.seed,
+                "dynamics": self.dynamics,
+                "safety_filter": self.safety_filter,
+                "return_mode": self.return_mode,
+                "reward_weights": dict(self.reward_weights),
+                "level": self.level,
+            }
+        )
 
 
 @dataclass(frozen=True)
@@ -53,7 +75,7 @@ class Sweep:
     scenarios: Mapping[str, Scenario]
     planners: Mapping[str, PlannerSpec]
     seeds: range
-    dynamics: Dynamics = "lpv"
+    dynamics: DynamicsName = "lpv"
     safety_filter: bool = False
 
     @property
@@ -63,39 +85,22 @@ class Sweep:
 
     def entries(self) -> Iterator[Entry]:
         """Every flight; seed by seed, so that a sweep under way compares like with like."""
-        common = self._common()
+        on = self.safety_filter or None
         for seed in self.seeds:
             for name, scenario in self.scenarios.items():
-                for label, spec in self.planners.items():
-                    # the label too: two labels of one planner are two rows
-                    content = {
-                        **{"label": label, **spec.identity(), **common},
-                        **{"scenario": self._scenario_hashes[name], "seed": seed},
-                    }
-                    yield Entry(
-                        content_hash(content),
-                        self._scenario_hashes[name],
-                        scenario,
-                        spec,
-                        seed,
-                        self.dynamics,
-                        self.safety_filter,
-                    )
+                sha256 = self._scenario_hashes[name]
+                for spec in self.planners.values():
+                    yield Entry(scenario, sha256, spec, seed, self.dynamics, on)
 
     def description(self) -> dict[str, Any]:
         """The sweep as plain data: two with the same description have the same entries."""
         return {
-            **self._common(),
-            "seeds": f"{self.seeds.start}:{self.seeds.stop}",
-            "scenarios": dict(self._scenario_hashes),
-            "planners": {label: spec.identity() for label, spec in self.planners.items()},
-        }
-
-    def _common(self) -> dict[str, Any]:
-        return {
             "version": version(PACKAGE),
             "dynamics": self.dynamics,
             "safety_filter": self.safety_filter,
+            "seeds": f"{self.seeds.start}:{self.seeds.stop}",
+            "scenarios": dict(self._scenario_hashes),
+            "planners": {label: spec.identity() for label, spec in self.planners.items()},
         }
 
     @cached_property
@@ -103,32 +108,10 @@ class Sweep:
         return {name: scenario_hash(scenario) for name, scenario in self.scenarios.items()}
 
 
-def source_of(planners: Iterable[PlannerSpec]) -> str:
+def source_of(entries: Iterable[Entry]) -> str:
     """Hash of the source code that flies: the world's and the planners'.
 
     It is kept with each flight but is not part of its key: a comment that changes should not
     undo a sweep. The table says where flights of several sources stand in it.
     """
-    return source_hash(["uas_coverage_env", *(spec.package for spec in planners)])
-
-
-def difference(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
-    """The first thing in which two descriptions differ, in words; empty where nothing does."""
-    for key in [*kept, *(key for key in asked if key not in kept)]:
-        if key not in asked:
-            return f"it has {key}, which is not asked for"
-        if key not in kept:
-            return f"it has no {key}"
-        mine, theirs = kept[key], asked[key]
-        if isinstance(mine, Mapping) and isinstance(theirs, Mapping):
-            inner = difference(mine, theirs)
-            if inner:
-                return f"{key}: {inner}"
-        elif mine != theirs:
-            return f"{key} is {_short(mine)} there, {_short(theirs)} asked for"
-    return ""
-
-
-def _short(value: Any) -> str:
-    text = str(value)
-    return text if len(text) <= 16 else f"{text[:12]}..."
+    return source_hash({"uas_coverage_env", *(entry.spec.package for entry in entries)})

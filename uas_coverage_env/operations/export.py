@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.suggestions import check_choice
-from uas_coverage_env.flight import MODES, Flight, SceneHistory, covered_at, sorties_summary
+from uas_coverage_env.flight import MODES, Flight, covered_at, sorties_summary
 from uas_coverage_env.flight.record import LANDED, LIMIT
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.mission.leg_model import Followed
 from uas_coverage_env.mission.separation import Waits, ready_s
 from uas_coverage_env.operations.apart import Begins, Part, Settled, kept_apart

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.flight.log import FlightLog
+from uas_coverage_env.flight.log import FlightLog, Taken
 from uas_coverage_env.flight.loop import recorded_versions
 from uas_coverage_env.flight.of_log import STATES, Estimate, OfLog, Pass, Unknown
 from uas_coverage_env.operations.corners import distances_m
@@ -23,7 +23,7 @@ from uas_coverage_env.operations.logs import Logged
 from uas_coverage_env.operations.logs.flights import chosen_flight
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle import tilts_and_turn
+from uas_coverage_env.vehicle.attitude import tilts_and_turn
 
 PLANNER = "log"
 """Name of the planner of what was flown elsewhere."""
@@ -182,7 +182,7 @@ class _Judged:
                 outcome["voltage_V"][i] = battery.voltage_V[k - 1]
                 outcome["current_A"][i] = battery.current_A[k - 1]
             outcome["returning"] = False  # no mode of the log
-            log.add({}, None, 0.0, None, outcome)
+            log.add({}, None, Taken(processor_s=None), None, outcome)
         fields = log.series()
         self._keep_measured(fields)
         return Flight(

@@ -7,14 +7,17 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, Flight, SceneHistory, seen_pictures, summary
+from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.scene_history import SceneHistory
+from uas_coverage_env.flight.seen import seen_pictures
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.replay.mark_data import marks
 from uas_coverage_env.replay.reach_data import reach
 from uas_coverage_env.replay.safety_data import floors_m, rooms
 from uas_coverage_env.replay.scene_data import hex_colour, scene_data
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 POSITION_M = 0.01
 PLAN_M = 0.1

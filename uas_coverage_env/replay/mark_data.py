@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from uas_coverage_env.flight import Flight, SceneHistory
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.replay.home_data import WayHome
 from uas_coverage_env.replay.safety_data import (
     FENCE,

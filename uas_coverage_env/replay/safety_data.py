@@ -6,7 +6,8 @@ Distances are those by which flights are judged (docs/rules.md), at the samples.
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight import MODES, Flight, SceneHistory
+from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
 
 FAR_M = 50.0

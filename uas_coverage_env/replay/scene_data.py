@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from uas_coverage_env.draw import colours
-from uas_coverage_env.flight import SceneHistory
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.replay.outline import outline_of
 

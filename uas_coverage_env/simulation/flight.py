@@ -27,22 +27,12 @@ from uas_coverage_env.simulation.points import (
     call_features,
     fly_at,
 )
-from uas_coverage_env.vehicle import (
-    DOD,
-    LIFT,
-    TAU_Z,
-    U_TH,
-    clip_wrench,
-    enter_air,
-    face_course,
-    leave_air,
-    lpv_step,
-    open_circuit_V,
-    plant_step,
-    push,
-    reseed_reference,
-)
-from uas_coverage_env.vehicle.discharge import discharge_further
+from uas_coverage_env.vehicle import lpv_step, plant_step
+from uas_coverage_env.vehicle.air import enter_air, leave_air, push
+from uas_coverage_env.vehicle.discharge import discharge_further, open_circuit_V
+from uas_coverage_env.vehicle.inner_loop import face_course, reseed_reference
+from uas_coverage_env.vehicle.layout import DOD, LIFT, TAU_Z, U_TH
+from uas_coverage_env.vehicle.lpv import clip_wrench
 
 
 @inlined_kernel

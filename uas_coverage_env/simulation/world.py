@@ -38,8 +38,8 @@ from uas_coverage_env.simulation.step import (
     begin_mission,
     step_world,
 )
-from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
 from uas_coverage_env.vehicle.battery import BatteryState
+from uas_coverage_env.vehicle.layout import DOD, PSI, U_TH, WZ
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.packs import (
@@ -50,7 +50,7 @@ from uas_coverage_env.world.packs import (
 )
 from uas_coverage_env.world.sensing import senses
 
-Dynamics = Literal["lpv", "nonlinear"]
+DynamicsName = Literal["lpv", "nonlinear"]
 StepCode = Callable[..., int]
 
 _OUTCOMES_IN_BLOCK = 256
@@ -156,7 +156,7 @@ class World:
         self,
         scenario: Scenario,
         *,
-        dynamics: Dynamics = "lpv",
+        dynamics: DynamicsName = "lpv",
         return_mode: bool = False,
         safety_filter: bool = False,
         measured_m: float = math.inf,
@@ -164,8 +164,8 @@ class World:
         judges_wrenches: bool = False,
         seed: int = 0,
     ) -> None:
-        if dynamics not in get_args(Dynamics):
-            allowed = ", ".join(get_args(Dynamics))
+        if dynamics not in get_args(DynamicsName):
+            allowed = ", ".join(get_args(DynamicsName))
             raise ValueError(f"dynamics is {dynamics!r}; it is one of {allowed}")
         self.scenario = scenario
         self.dynamics = dynamics

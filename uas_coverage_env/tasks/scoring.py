@@ -19,26 +19,31 @@ are published with the package (`anchors.json`).
 
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.resources import files
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.env.versions import V0
-from uas_coverage_env.flight import Episode, Planner, Policy, as_planner, evaluate
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.flight import Planner, as_planner
+from uas_coverage_env.flight.figures import ByName, figures
+from uas_coverage_env.flight.policy import Policy, PolicyFunction
+from uas_coverage_env.leaderboard import Entry, PlannerSpec, Row
+from uas_coverage_env.leaderboard.flying import flown
+from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.leaderboard.statistics import Estimate, estimate
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.tasks.levels import level_named
-from uas_coverage_env.tasks.task import Task, seeds_of
+from uas_coverage_env.tasks.task import Task
 
 RANDOM = "random"
 """The policy that draws each action uniformly from the action space of the level."""
 
-Entry = str | Planner | Policy
-"""A name (of a planner, or `random`), a planner, or a function from observation to action."""
+DESCRIPTION = {"command": "score"}
+"""What a store of scored missions says of itself: levels and planners can be added to it."""
 
 
 @dataclass(frozen=True)
@@ -59,30 +64,24 @@ class Anchors:
 
 
 @dataclass(frozen=True)
-class MissionScore:
+class MissionScore(ByName):
     """One mission of a planner.
 
     Attributes:
         seed: Of the mission.
         value: See above.
-        episode_return: Sum of the rewards of all UAS.
-        coverage: Share of the waypoints.
-        energy_share: Energy drawn over what all batteries may give.
-        lost: UAS that were lost.
-        home: UAS that are home at the end.
-        n_uas: UAS of the mission.
-        steps: Until its end.
+        figures: Of its flight (docs/flight_directory.md), by name; they are attributes of it, too.
     """
 
     seed: int
     value: float
-    episode_return: float
-    coverage: float
-    energy_share: float
-    lost: int
-    home: int
-    n_uas: int
-    steps: int
+    figures: Mapping[str, bool | int | float | None]
+
+    @classmethod
+    def of(cls, row: Row) -> Self:
+        """The score of a flight; one that could not be flown is worth nothing."""
+        found = {name: getattr(row, name) for name, each in figures().items() if each.in_rows}
+        return cls(row.seed, mission_value(row), found)
 
 
 @dataclass(frozen=True)
@@ -100,25 +99,16 @@ class Score:
     score: Estimate
 
     def mean(self, measure: str) -> float:
-        """The mean of a measure of `MissionScore`."""
-        return float(np.mean([getattr(mission, measure) for mission in self.missions]))
+        """The mean of the value, or of a figure of the missions that have it; 0: none has."""
+        found = [getattr(mission, measure) for mission in self.missions]
+        there = [value for value in found if value is not None]
+        return float(np.mean(there)) if there else 0.0
 
 
-def mission_value(episode: Episode, scenario: Scenario) -> tuple[float, float]:
-    """The value of a mission, and its share of energy, see above."""
-    share = episode.energy_Wh / available_Wh(scenario)
-    at_home = episode.home / episode.n_uas
-    return episode.coverage * at_home * (1.0 - 0.5 * min(share, 1.0)), share
-
-
-def available_Wh(scenario: Scenario) -> float:
-    """What all batteries may give: charge above what must be left, at the mean voltage [Wh]."""
-    total_Wh = 0.0
-    for uas, vehicle in zip(scenario.uas, scenario.vehicles, strict=True):
-        battery = vehicle.battery
-        usable = uas.soc_0 - (1.0 - uas.dod_max)
-        total_Wh += usable * battery.capacity_Ah * float(np.mean(battery.ocv_V))
-    return total_Wh
+def mission_value(flown: Any) -> float:
+    """The value of a mission, see above, of what has its figures: a row, an episode."""
+    at_home = flown.home / flown.n_uas
+    return flown.coverage * at_home * (1.0 - 0.5 * min(flown.energy_share or 0.0, 1.0))
 
 
 def anchors_of(level: str) -> Anchors | None:
@@ -129,48 +119,135 @@ def anchors_of(level: str) -> Anchors | None:
 
 
 def score(
-    planner: Entry,
+    planner: str | Planner | Policy,
     level: str,
     *,
     missions: int = 20,
     split: str = "test",
     swarm_of: int | None = None,
     on_mission: Callable[[MissionScore], object] | None = None,
-    known: Sequence[MissionScore] = (),
     **chosen: Any,
 ) -> Score:
     """Fly the first missions of a split and score them.
 
     Args:
-        planner: `random`, the name of a planner, a planner, or a policy. Planners fly with the
-            assistants of the level, whatever they ask for.
+        planner: `random`, the name of a planner, a planner, or a policy: a function from
+            observation to action. Planners fly with the assistants of the level, whatever they
+            ask for.
         level: Its name.
         missions: How many.
         split: validation or test.
         swarm_of: For a policy of the whole swarm, see `as_planner`.
         on_mission: Called with each mission that was flown.
-        known: Missions that were flown before; they are not repeated.
         **chosen: For a policy: action, observation and so on, where they are not the level's.
 
     Raises:
         InputError: Unknown planner, or it refuses a mission.
+        PlannerError: The planner raised an exception, or gave commands that cannot be flown.
         ValueError: Unknown level or split, a number of missions that there is not, or a setting
             that is the level's affair.
     """
     task = level_named(level)
-    seeds = seeds_of(split)
-    if not 1 <= missions <= len(seeds):
-        raise ValueError(f"missions is {missions}; give 1 to {len(seeds)}")
-    before = {mission.seed: mission for mission in known}
-    flown = []
-    for seed in seeds[:missions]:
-        mission = before.get(seed)
-        if mission is None:
-            mission = _flown(planner, task, seed, swarm_of, chosen)
-            if on_mission is not None:
-                on_mission(mission)
-        flown.append(mission)
-    return scored(level, flown)
+    spec = spec_of(planner, task, swarm_of, chosen)
+    found = []
+    for mission in _flown_one_by_one(spec, task, task.scenarios(split, missions)):
+        if on_mission is not None:
+            on_mission(mission)
+        found.append(mission)
+    return scored(level, found)
+
+
+def spec_of(
+    planner: str | Planner | Policy,
+    task: Task,
+    swarm_of: int | None = None,
+    chosen: Mapping[str, Any] | None = None,
+) -> PlannerSpec:
+    """What is scored.
+
+    Args:
+        planner: See `score`.
+        task: The level.
+        swarm_of: See `score`.
+        chosen: See `score`.
+
+    Raises:
+        InputError: Unknown planner.
+        ValueError: A setting is wrong, or the level's affair.
+    """
+    settings = task.settings(**(chosen or {}))
+    if planner == RANDOM:
+        return _Random(RANDOM, RANDOM, {}, "", "uas_coverage_env", settings)
+    if isinstance(planner, str):
+        return PlannerSpec.named(planner, planner)
+    flies: Any = planner
+    if not hasattr(planner, "act"):
+        flies = as_planner(flies, swarm_of=swarm_of, **settings)
+    return _InMemory("", type(planner).__name__, {}, "", "", flies)
+
+
+def entry_of(spec: PlannerSpec, task: Task, seed: int, scenario: Scenario) -> Entry:
+    """The flight of a mission of a level."""
+    limited = MissionSettings(max_cycles=task.max_cycles).limited(scenario)
+    return Entry(
+        limited,
+        scenario_hash(limited),
+        spec,
+        seed,
+        safety_filter=task.safety_filter,
+        return_mode=task.return_mode,
+        reward_weights=task.reward_weights,
+        level=task.level,
+    )
+
+
+def _flown_one_by_one(
+    spec: PlannerSpec, task: Task, missions: Mapping[int, Scenario]
+) -> Iterator[MissionScore]:
+    """Missions of a level as a planner or a policy flies them, in this process."""
+    for seed, scenario in missions.items():
+        entry = entry_of(spec, task, seed, scenario)
+        yield MissionScore.of(Row.of(entry, flown(entry), ""))
+
+
+class RandomPolicy(PolicyFunction):
+    """Draws each action uniformly from the action space; the seed of a mission repeats it.
+
+    Args:
+        settings: Of the environments of the level.
+    """
+
+    def __init__(self, settings: Mapping[str, Any]) -> None:
+        super().__init__(self._drawn, MissionSettings.of(settings))
+
+    def reset(self, brief: MissionBrief, seed: int) -> None:
+        """Start a new mission."""
+        super().reset(brief, seed)
+        self._space = self._cockpit.actions.space()
+        self._space.seed(seed)
+
+    def _drawn(self, seen: Any) -> Any:
+        return self._space.sample()
+
+
+@dataclass(frozen=True)
+class _Random(PlannerSpec):
+    """The random policy of a level."""
+
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def load(self) -> Planner:
+        return RandomPolicy(self.settings)
+
+
+@dataclass(frozen=True)
+class _InMemory(PlannerSpec):
+    """A planner that has no name."""
+
+    planner_itself: Any = field(default=None, compare=False)
+
+    def load(self) -> Planner:
+        return self.planner_itself
 
 
 def scored(level: str, missions: Sequence[MissionScore]) -> Score:
@@ -192,11 +269,6 @@ def scored(level: str, missions: Sequence[MissionScore]) -> Score:
     return Score(level, tuple(missions), estimate(shares, "scenarios"))
 
 
-def as_row(mission: MissionScore) -> dict[str, Any]:
-    """A mission as plain data."""
-    return asdict(mission)
-
-
 def _by_training(missions: Sequence[MissionScore]) -> list[list[MissionScore]]:
     trainings: list[list[MissionScore]] = []
     flown: Counter[int] = Counter()
@@ -206,28 +278,3 @@ def _by_training(missions: Sequence[MissionScore]) -> list[list[MissionScore]]:
         trainings[flown[mission.seed]].append(mission)
         flown[mission.seed] += 1
     return trainings
-
-
-def _flown(
-    planner: Entry, task: Task, seed: int, swarm_of: int | None, chosen: Mapping[str, Any]
-) -> MissionScore:
-    scenario = task.scenario(seed)
-    settings = task.settings(**chosen)
-    flies = planner
-    if planner == RANDOM:
-        space = actions_of(V0.kind_of(task.action), scenario).space()
-        space.seed(seed)
-        flies = as_planner(lambda seen: space.sample(), **settings)
-    (episode,) = evaluate(flies, scenario, seeds=[seed], swarm_of=swarm_of, **settings).episodes
-    value, energy_share = mission_value(episode, scenario)
-    return MissionScore(
-        seed=seed,
-        value=value,
-        episode_return=episode.episode_return,
-        coverage=episode.coverage,
-        energy_share=energy_share,
-        lost=episode.lost,
-        home=episode.home,
-        n_uas=episode.n_uas,
-        steps=episode.steps,
-    )

@@ -66,6 +66,21 @@ class Task:
         """The mission of a seed; the same each time."""
         return _mission(self, seed)
 
+    def scenarios(self, split: str, n: int | None = None) -> dict[int, Scenario]:
+        """The first missions of a split, by their seeds.
+
+        Args:
+            split: training, validation or test.
+            n: How many; None: all.
+
+        Raises:
+            ValueError: There is no such split, or it has fewer missions.
+        """
+        seeds = seeds_of(split)
+        if n is not None and not 1 <= n <= len(seeds):
+            raise ValueError(f"missions is {n}; give 1 to {len(seeds)}")
+        return {seed: self.scenario(seed) for seed in seeds[:n]}
+
     def missions(self, split: str = "training") -> MissionSource:
         """What environments draw their missions from.
 

@@ -11,7 +11,8 @@ from uas_coverage_env.compiled.memory import Memory, record_dtype
 from uas_coverage_env.entities.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.features.feature import FEATURE_DTYPE, Feature, feature_tables
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
+from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
 from uas_coverage_env.vehicle.stopping import stopping_of
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns

@@ -17,10 +17,10 @@ from uas_coverage_env.entities.state import (
 )
 from uas_coverage_env.features.feature import Feature, Point
 from uas_coverage_env.features.of_scenario import features_of
-from uas_coverage_env.geometry import cylinder_clearance, outside_cylinder
+from uas_coverage_env.geometry.segments import cylinder_clearance, outside_cylinder
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import landing, take_off
-from uas_coverage_env.vehicle import DOD, U_TH, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle.layout import DOD, U_TH, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.vehicle.parts import MAX_FURTHER_PAIRS
 from uas_coverage_env.world.contacts import obstacle_breaches
 from uas_coverage_env.world.coverage import can_cover

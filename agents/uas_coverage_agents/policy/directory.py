@@ -59,9 +59,7 @@ def save_policy(
         OSError: The directory cannot be written.
     """
     directory = Path(directory)
-    arrays = {
-        name: np.ascontiguousarray(tensor, dtype=np.float32) for name, tensor in tensors.items()
-    }
+    arrays = _as_kept(tensors)
     _check_tensors(arrays, description, str(directory / WEIGHTS))
     weights = safetensors.save(arrays)
     checksum = hashlib.sha256(weights).hexdigest()
@@ -70,6 +68,15 @@ def save_policy(
     directory.mkdir(parents=True, exist_ok=True)
     write_atomically(directory / WEIGHTS, weights)
     write_atomically(directory / DESCRIPTION, f"{text}\n".encode())
+
+
+def weights_sha256(tensors: Mapping[str, NDArray[np.floating]]) -> str:
+    """The checksum of weights as `save_policy` writes them."""
+    return hashlib.sha256(safetensors.save(_as_kept(tensors))).hexdigest()
+
+
+def _as_kept(tensors: Mapping[str, NDArray[np.floating]]) -> dict[str, NDArray[np.float32]]:
+    return {name: np.ascontiguousarray(each, np.float32) for name, each in tensors.items()}
 
 
 def load_policy(directory: str | Path) -> Policy:

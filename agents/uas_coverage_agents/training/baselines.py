@@ -4,16 +4,13 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from uas_coverage_agents.training import curve
 from uas_coverage_agents.training.checkpoint import CurvePoint
-from uas_coverage_agents.training.score import MEASURES, measured
+from uas_coverage_agents.training.score import MEASURES, Validation
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import load_planner, rollout
-from uas_coverage_env.flight.interruption import unless_stopped
-from uas_coverage_env.replay.figures import BASELINES
+from uas_coverage_env.leaderboard import PlannerSpec
+from uas_coverage_env.replay.figures.training import BASELINES
 from uas_coverage_env.scenario import Scenario
 
 NO_PLANNER = "none"
@@ -32,7 +29,7 @@ def planners_of(names: str) -> list[str]:
         return []
     planners = [name.strip() for name in names.split(",")]
     for name in planners:
-        load_planner(name)
+        PlannerSpec.named(name, name)
     return planners
 
 
@@ -41,6 +38,7 @@ def fly_baselines(
     scenarios: Sequence[Scenario],
     directory: Path,
     say: Callable[[str], object],
+    validation: Validation,
 ) -> None:
     """Fly what was not flown before: each leaves a learning curve of one row.
 
@@ -49,6 +47,7 @@ def fly_baselines(
         scenarios: Those of the learning curve.
         directory: Of the training.
         say: Told what is flown, and which cannot fly these missions.
+        validation: Who flies, and where the flights are kept.
     """
     for name in planners:
         folder = directory / BASELINES / re.sub(r"[/:\\]", "-", name)
@@ -56,11 +55,11 @@ def fly_baselines(
             continue
         say(f"flying the {len(scenarios)} missions of the learning curve with {name}")
         try:
-            flown = [measured(unless_stopped(rollout(scenario, name))) for scenario in scenarios]
+            flown = validation.fly(PlannerSpec.named(name, name), scenarios)
         except (InputError, PlannerError) as error:
             say(f"no baseline {name}: {error}")
             continue
-        means = dict(zip(MEASURES, np.mean(flown, axis=0).tolist(), strict=True))
+        means = dict(zip(MEASURES, flown.mean(axis=0).tolist(), strict=True))
         fields = {key: value for key, value in means.items() if key in CurvePoint.model_fields}
         folder.mkdir(parents=True, exist_ok=True)
         curve.write_table([CurvePoint(steps=0, process_s=0.0, wall_s=0.0, **fields)], folder)

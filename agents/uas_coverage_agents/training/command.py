@@ -1,11 +1,10 @@
 """`uas-coverage train`: train a policy, or go on with its training."""
 
-import json
 import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,21 +14,19 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 
 from uas_coverage_agents.training.published import published_names
+from uas_coverage_env.cli.options import BackendOption, JobsOption
 from uas_coverage_env.files.output_dir import prepare_folder
-from uas_coverage_env.files.plain_files import read_bytes, write_atomically
-from uas_coverage_env.files.strict_toml import InputError, parse
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.runner import STORE, Workers, opened
 
 if TYPE_CHECKING:
     from uas_coverage_agents.policy import Policy
     from uas_coverage_agents.training.loop import TrainingJob, TrainingProgress
 
-ORDER = "order.json"
-
-_FAILED = 1
 _LAST_SEED = 2**32 - 1  # of Stable-Baselines3
 _SECONDS_BETWEEN_LINES = 10.0
 _OURS = (
-    *(ORDER, "checkpoints", "tensorboard", "learning_curve.csv", "learning_curve.png", "policy"),
+    *("checkpoints", "tensorboard", "learning_curve.csv", "learning_curve.png", "policy"),
     "baselines",
 )
 
@@ -75,6 +72,8 @@ def train(
             help="Planners whose flights stand beside the learning curve; `none` for none.",
         ),
     ] = "nearest-waypoint,trajectory",
+    backend: BackendOption = "process",
+    jobs: JobsOption = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Delete the training in --out and restart.")
     ] = False,
@@ -104,38 +103,48 @@ def train(
             f"{zip_file}: a Stable-Baselines3 zip holds pickles, which can execute anything; "
             f"add --trust-pickle if you trust its author"
         )
-    loop, filelock = _learn_extra()
+    loop = _learn_extra()
     from uas_coverage_agents.training.baselines import fly_baselines, planners_of
+    from uas_coverage_agents.training.score import Validation
+    from uas_coverage_env.leaderboard import Row
 
     beside = planners_of(baselines)
     name = Path(algorithm).stem
     job = loop.TrainingJob(name, config, seed, minutes, missions, checkpoint_s)
     directory = out or Path("trainings") / f"{name}-{seed}"
     screen = Console(highlight=False, soft_wrap=True)
-    _check_directory(directory, job, overwrite=overwrite)
+    names = prepare_folder(directory) - {".lock"}
+    if names and STORE not in names:
+        raise InputError(
+            f"{directory}: is not empty and holds no training that this version goes on with; "
+            "give another --out"
+        )
     try:
-        with filelock.FileLock(directory / ".lock", timeout=0), _shown(screen) as on_progress:
+        with (
+            Workers(jobs, backend) as workers,
+            opened(directory, _record(job), Row, overwrite=overwrite) as store,
+            _shown(screen) as on_progress,
+        ):
             if overwrite:
                 _discard(directory)
-            _note(directory, job, screen)
+            elif names:
+                screen.print(f"{directory}: going on with the training there", markup=False)
+            validation = Validation(workers, store)
             if zip_file is not None:
-                policy = loop.import_zip(job, zip_file, directory)
+                policy = loop.import_zip(job, zip_file, directory, validation)
             else:
-                fly_baselines(beside, loop.curve_scenarios(job), directory, screen.print)
-                policy = loop.train(job, directory, on_progress)
-    except filelock.Timeout:
-        raise InputError(f"{directory}: another training is at work there") from None
+                missions_flown = loop.curve_scenarios(job)
+                fly_baselines(beside, missions_flown, directory, screen.print, validation)
+                policy = loop.train(job, directory, on_progress, validation)
     except KeyboardInterrupt:
-        screen.print("stopped by hand; the same command goes on from the last checkpoint")
-        raise typer.Exit(_FAILED) from None
+        screen.print("the same command goes on from the last checkpoint")
+        raise
     _report(screen, policy, directory)
 
 
-def _learn_extra() -> tuple[Any, Any]:
-    """The modules that need the extra `learn`."""
+def _learn_extra() -> Any:
+    """The module that needs the extra `learn`."""
     try:
-        import filelock
-
         from uas_coverage_agents.training import loop
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("uas_coverage"):
@@ -144,42 +153,19 @@ def _learn_extra() -> tuple[Any, Any]:
             f"training needs the package {error.name}, which is not installed: "
             f"python -m pip install 'uas-coverage-env[learn]'"
         ) from error
-    return loop, filelock
+    return loop
 
 
 def _record(job: "TrainingJob") -> dict[str, Any]:
     """What has to be the same for a training to go on."""
     return {
+        "command": "train",
         "name": job.name,
         "seed": job.seed,
         "minutes": job.minutes,
         "missions": job.missions,
         "config": job.config.model_dump(mode="json"),
     }
-
-
-def _check_directory(directory: Path, job: "TrainingJob", *, overwrite: bool) -> None:
-    """Refuse to mix a training with something else."""
-    from uas_coverage_agents.training.config import TrainingConfig
-
-    names = prepare_folder(directory) - {".lock"}
-    if names and ORDER not in names:
-        raise InputError(f"{directory}: is not empty and holds no training; give another --out")
-    if not names or overwrite:
-        return
-    try:
-        there = json.loads(read_bytes(directory / ORDER))
-    except (OSError, ValueError, RecursionError):
-        there = None
-    if isinstance(there, dict) and isinstance(there.get("config"), dict):
-        with suppress(InputError):  # an older version may have had other names for some things
-            config = parse(there["config"], TrainingConfig, ORDER)
-            there["config"] = config.model_dump(mode="json")
-    if there != json.loads(json.dumps(_record(job))):
-        raise InputError(
-            f"{directory}: holds a training with other settings; give another --out, or start "
-            f"anew with --overwrite"
-        )
 
 
 def _discard(directory: Path) -> None:
@@ -190,14 +176,6 @@ def _discard(directory: Path) -> None:
             shutil.rmtree(path)
         else:
             path.unlink(missing_ok=True)
-
-
-def _note(directory: Path, job: "TrainingJob", screen: Console) -> None:
-    path = directory / ORDER
-    if path.exists():
-        screen.print(f"{directory}: going on with the training there", markup=False)
-        return
-    write_atomically(path, json.dumps(_record(job), indent=1).encode())
 
 
 @contextmanager

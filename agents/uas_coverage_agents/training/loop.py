@@ -19,11 +19,9 @@ from uas_coverage_agents.training.checkpoint import (
 )
 from uas_coverage_agents.training.model_arrays import from_arrays, to_arrays
 from uas_coverage_agents.training.scenarios import validation_scenarios
-from uas_coverage_agents.training.score import MEASURES
+from uas_coverage_agents.training.score import MEASURES, Validation
 from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 from uas_coverage_env.scenario import Scenario
-
-__all__ = ["TrainingJob", "TrainingProgress", "curve_scenarios", "import_zip", "train"]
 
 CHECKPOINTS = "checkpoints"
 POLICY = "policy"
@@ -52,6 +50,7 @@ def train(
     job: TrainingJob,
     directory: Path,
     on_progress: Callable[[TrainingProgress], object] = lambda _: None,
+    validation: Validation | None = None,
 ) -> Policy:
     """Train a policy, or go on with its training; leaves everything in the directory.
 
@@ -61,11 +60,12 @@ def train(
         job: What to train.
         directory: Where; a checkpoint in it is gone on from.
         on_progress: Told now and then.
+        validation: Flies its missions; None: one after the other, and keeps none of them.
 
     Raises:
         InputError: The checkpoints there cannot be read or are those of another network.
     """
-    training_run = TrainingRun.untrained(job)
+    training_run = TrainingRun.untrained(job, validation)
     before = newest_checkpoint(directory / CHECKPOINTS)
     if before is not None:
         from_arrays(before.tensors, training_run.model, training_run.lanes)
@@ -83,13 +83,15 @@ def train(
     return training_run.publish(directory / POLICY)
 
 
-def import_zip(job: TrainingJob, zip_file: Path, directory: Path) -> Policy:
+def import_zip(
+    job: TrainingJob, zip_file: Path, directory: Path, validation: Validation | None = None
+) -> Policy:
     """Turn a model that Stable-Baselines3 has saved into a policy, scored like a trained one.
 
     Raises:
         InputError: The file is no such zip, or holds another network.
     """
-    training_run = TrainingRun.untrained(job)
+    training_run = TrainingRun.untrained(job, validation)
     training_run.read_zip(zip_file)
     return training_run.publish(directory / POLICY)
 

@@ -5,7 +5,7 @@ import pickle
 import platform
 import warnings
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -15,18 +15,13 @@ from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.policy import (
-    Policy,
-    PolicyDescription,
-    Training,
-    load_policy,
-    save_policy,
-)
+from uas_coverage_agents.policy import Policy, PolicyDescription, load_policy, save_policy
+from uas_coverage_agents.policy.description import Training
 from uas_coverage_agents.training.config import TrainingConfig
 from uas_coverage_agents.training.learner import Learner
 from uas_coverage_agents.training.learners import learner_of
 from uas_coverage_agents.training.scenarios import validation_scenarios
-from uas_coverage_agents.training.score import fly, score
+from uas_coverage_agents.training.score import Validation, fly, score_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario
 
@@ -65,6 +60,7 @@ class TrainingRun:
         learner: How policies of this interface are trained.
         lanes: Where it learns.
         model: What it has learned.
+        validation: Flies its missions.
         process_s: Processor time so far, in all sessions [s].
         wall_s: Time so far, in all sessions [s].
     """
@@ -73,11 +69,12 @@ class TrainingRun:
     learner: Learner
     lanes: VecEnv
     model: BaseAlgorithm
+    validation: Validation = field(default_factory=Validation)
     process_s: float = 0.0
     wall_s: float = 0.0
 
     @classmethod
-    def untrained(cls, job: TrainingJob) -> "TrainingRun":
+    def untrained(cls, job: TrainingJob, validation: Validation | None = None) -> "TrainingRun":
         """A fresh one.
 
         One thread, so that a seed gives the same weights again on the same machine.
@@ -85,7 +82,8 @@ class TrainingRun:
         torch.set_num_threads(1)
         learner = learner_of(job.config)
         lanes = learner.lanes(job.config, job.seed)
-        return cls(job, learner, lanes, learner.model(job.config, lanes, job.seed))
+        model = learner.model(job.config, lanes, job.seed)
+        return cls(job, learner, lanes, model, validation or Validation())
 
     def policy(self) -> Policy:
         """What it would fly like now."""
@@ -117,13 +115,14 @@ class TrainingRun:
             scenarios,
             safety_filter=settings.safety_filter,
             return_mode=settings.return_mode,
+            validation=self.validation,
         )
 
     def publish(self, directory: Path) -> Policy:
         """Score it on unseen scenarios and write it; gives what was written."""
         family = self.job.config.scenarios.family
         scenarios = validation_scenarios(family, self.job.missions)
-        scored = score(self.flights(scenarios), f"{family.name}, validation")
+        scored = score_of(self.flights(scenarios), f"{family.name}, validation")
         policy = self.policy()
         described = policy.description.model_copy(update={"score": scored})
         save_policy(directory, described, policy.tensors)

@@ -26,7 +26,7 @@ from uas_coverage_agents.waypoint.team import (
     NOT_HOME,
     TIME,
 )
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.batch.state_dict import (
     Limits,

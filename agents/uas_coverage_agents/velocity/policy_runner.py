@@ -12,7 +12,8 @@ from uas_coverage_env.env import OBSERVATION_SIZE, MissionInterface, observation
 from uas_coverage_env.env.actions import ACTIONS, actions_of
 from uas_coverage_env.env.observation import OBSERVATION, SCALES
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import Approach, MissionBrief, first_sight
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.approach import Approach
 from uas_coverage_env.world import Command, SwarmState, Velocity
 
 LAYOUT = "uas_coverage_v0"

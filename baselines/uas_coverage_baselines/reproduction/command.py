@@ -2,10 +2,13 @@
 
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from uas_coverage_env.cli.options import BackendOption, JobsOption, OverwriteOption
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -13,9 +16,8 @@ if TYPE_CHECKING:
     from uas_coverage_baselines.reproduction.comparison import ReproducedPaper
     from uas_coverage_baselines.reproduction.published import Paper
     from uas_coverage_env.flight import Flight
-    from uas_coverage_env.leaderboard import Store, Sweep
+    from uas_coverage_env.leaderboard import Row, Sweep
 
-_FLIGHTS = "flights"
 _PROGRAM_STEP = 60
 _WIDEST_TABLE = 200
 _QUICK_CAP_S, _CAP_S = 10.0, 120.0
@@ -31,16 +33,12 @@ def reproduce(
         bool,
         typer.Option("--quick", help="Minutes: one drawn map, short solves, fewer parameters."),
     ] = False,
-    jobs: Annotated[
-        int | None,
-        typer.Option(min=1, help="Flights in parallel; default: one per core.", show_default=False),
-    ] = None,
+    backend: BackendOption = "process",
+    jobs: JobsOption = None,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Stop each flight after this many steps, for a look.")
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Delete the flights in --out.")
-    ] = False,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Fly a paper's mission with its settings, and set its figures beside ours.
 
@@ -50,9 +48,10 @@ def reproduce(
     """
     # what follows is heavy, and this module is loaded whenever the command line starts
     from uas_coverage_baselines.reproduction.published import paper_named
-    from uas_coverage_env.cli.compare import fly_sweep
-    from uas_coverage_env.cli.output import DONE, FAILED, console, one_line
-    from uas_coverage_env.leaderboard import opened, source_of
+    from uas_coverage_env.cli.output import FAILED, console, one_line
+    from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_others
+    from uas_coverage_env.leaderboard import Row
+    from uas_coverage_env.runner import Workers, opened
 
     _need_matplotlib()
     published = paper_named(paper)
@@ -67,25 +66,23 @@ def reproduce(
         ]
     )
     screen = console()
-    with opened(out, sweep.description(), overwrite=overwrite) as store:
-        trouble = fly_sweep(
-            list(sweep.entries()),
-            store,
-            screen,
-            _jobs(jobs),
-            "process",
-            source_of(sweep.planners.values()),
-            keep=out / _FLIGHTS,
-        )
-        flights = {} if trouble else _flown(published, store, out)
-    if trouble:
-        sys.stderr.write(f"error: {one_line(trouble)}\n")
-        raise typer.Exit(FAILED)
+    described = {"command": "reproduce", "paper": paper, **sweep.description()}
+    entries = list(sweep.entries())
+    with (
+        Workers(jobs, backend) as workers,
+        opened(out, described, Row, overwrite=overwrite) as store,
+    ):
+        refuse_others(store, entries)
+        trouble = fly_and_keep(entries, store, workers, screen, "flight")
+        rows = store.rows()
+    end_with(rows, trouble)
+    flights = _flown(published, rows, out)
     done = _written(published, flights, quick, command, out, screen)
     failures = done.failures()
     for line in failures:
         sys.stderr.write(f"out of tolerance: {one_line(line)}\n")
-    raise typer.Exit(FAILED if failures else DONE)
+    if failures:
+        raise typer.Exit(FAILED)
 
 
 def _need_matplotlib() -> None:
@@ -99,16 +96,11 @@ def _need_matplotlib() -> None:
         )
 
 
-def _jobs(asked: int | None) -> int:
-    from uas_coverage_env.leaderboard import jobs_of
-
-    return jobs_of(asked, "process")
-
-
 def _sweep(paper: "Paper", seeds: str, quick: bool, steps: int | None) -> "Sweep":
     """The map that stands for the paper's and those drawn, with the paper's planner."""
     from uas_coverage_env.leaderboard import Sweep, planner_specs_of, seed_range
-    from uas_coverage_env.scenario import flood_village, load_scenario
+    from uas_coverage_env.scenario import load_scenario
+    from uas_coverage_env.scenario.families.flood_village import flood_village
 
     drawn = seed_range("--seeds", seeds)
     maps = [load_scenario(paper.scenario), *map(flood_village, drawn[:1] if quick else drawn)]
@@ -124,17 +116,13 @@ def _text(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _flown(paper: "Paper", store: "Store", out: Path) -> "dict[str, Flight]":
-    """The flights of the store, the one that stands for the paper's first."""
-    from uas_coverage_env.files.strict_toml import InputError
+def _flown(paper: "Paper", rows: "Sequence[Row]", out: Path) -> "dict[str, Flight]":
+    """The flights that are kept, the one that stands for the paper's first."""
     from uas_coverage_env.flight import Flight
-    from uas_coverage_env.leaderboard import FAILED, kept_as
+    from uas_coverage_env.leaderboard.flying import kept_as
 
-    rows = sorted(store.rows(), key=lambda row: (row.scenario != paper.scenario, row.scenario))
-    for row in rows:
-        if row.status == FAILED:
-            raise InputError(f"{row.scenario} could not be flown: {row.reason}")
-    return {row.scenario: Flight.load(out / _FLIGHTS / kept_as(row)) for row in rows}
+    ordered = sorted(rows, key=lambda row: (row.scenario != paper.scenario, row.scenario))
+    return {row.scenario: Flight.load(out / kept_as(row)) for row in ordered}
 
 
 def _written(

@@ -11,7 +11,7 @@ from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 from uas_coverage_env.env.api.parallel import CoverageParallelEnv
 from uas_coverage_env.env.episode.settings import MissionKeywords, takes_settings
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import ScenarioLike
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.world import Command, SwarmState
 
 

@@ -10,6 +10,7 @@ from gymnasium.utils import seeding
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
+from uas_coverage_env.entities.state import FLYING, SWAPPING
 from uas_coverage_env.env.api.documentation import Versioned
 from uas_coverage_env.env.api.forms import LastKnown, observation_space, shown
 from uas_coverage_env.env.episode.express import action_of
@@ -19,8 +20,9 @@ from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettin
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.report import REWARD, STATUS
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
+from uas_coverage_env.world import Command, SwarmState
 
 Observations = dict[str, Any]
 """Of each agent that acted: an array, or a dictionary with `mask_in_observation`."""

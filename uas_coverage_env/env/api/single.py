@@ -11,6 +11,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING, SWAPPING
 from uas_coverage_env.env.api.documentation import Versioned
 from uas_coverage_env.env.api.forms import observation_space, shown
 from uas_coverage_env.env.api.spec import plain_spec
@@ -22,8 +23,9 @@ from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
 from uas_coverage_env.env.report import COVERED, ENERGY, FIRST_TERM, STATUS
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING, SWAPPING, Command, SwarmState
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
+from uas_coverage_env.world import Command, SwarmState
 
 
 class CoverageSwarmEnv(Versioned, gymnasium.Env[Any, NDArray[Any]]):

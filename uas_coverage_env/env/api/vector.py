@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import ABSENT
 from uas_coverage_env.env.api.documentation import Versioned
 from uas_coverage_env.env.api.forms import observation_space, shown
 from uas_coverage_env.env.api.spec import plain_spec
@@ -27,8 +28,9 @@ from uas_coverage_env.env.episode.settings import MissionKeywords, takes_setting
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, offered
 from uas_coverage_env.env.rendering.tiles import BATCH_RENDER_MODES, Tiles
 from uas_coverage_env.env.report import FILTERED, STATUS
-from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import ABSENT, Command
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
+from uas_coverage_env.world import Command
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next_step",

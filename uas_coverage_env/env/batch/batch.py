@@ -9,10 +9,10 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
-from uas_coverage_env.entities.state import STATE
+from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.actions.given import accept_of_lanes
 from uas_coverage_env.env.batch.checkpoint import checked
 from uas_coverage_env.env.batch.drawn import pool_of
@@ -49,10 +49,11 @@ from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettin
 from uas_coverage_env.env.episode.step import ACCEPTED, Rules
 from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.simulation import swarm_state
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.simulation.flight import feature_code
-from uas_coverage_env.world import FLYING, Command, SwarmState, WorldState
+from uas_coverage_env.simulation.world import swarm_state
+from uas_coverage_env.world import Command, SwarmState, WorldState
 from uas_coverage_env.world.arena import ARENA
 
 AUTORESET = {

@@ -18,7 +18,8 @@ from uas_coverage_env.env.batch.state_dict import check_values
 from uas_coverage_env.env.episode.memory import FIRST_OBSERVATION, LEARNERS, TABLES, Tables
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.features.feature import fitted_to, in_slots, memory_words
-from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
+from uas_coverage_env.scenario import MissionSource, Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.simulation.scenes import changes_scene
 from uas_coverage_env.world.arena import ARENA, Arena, has_true_vehicles
 from uas_coverage_env.world.events import goes_home

@@ -18,6 +18,7 @@ from uas_coverage_env.compiled.kernels import (
 )
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view, rows_view
+from uas_coverage_env.entities.state import ABSENT, FLYING, SWAPPING
 from uas_coverage_env.env.batch.memory import (
     DRAW,
     FLY,
@@ -59,7 +60,6 @@ from uas_coverage_env.env.report import (
 from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.simulation.points import begin_features
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
-from uas_coverage_env.world import ABSENT, FLYING, SWAPPING
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import begin_events
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory, Pool, Values
 from uas_coverage_env.compiled.random import SEEDS
-from uas_coverage_env.entities.state import STATE
+from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.episode.memory import LEARNERS, SCRATCH, Learners, Scratch
 from uas_coverage_env.env.observation import K_WAYPOINTS
 from uas_coverage_env.env.report import REPORT_SIZE
-from uas_coverage_env.world import FLYING, WorldState
+from uas_coverage_env.world import WorldState
 
 NEXT_STEP, SAME_STEP, DISABLED, WAITS = range(4)
 """When a mission that has ended begins anew: in the next step, in the same, or never by itself;

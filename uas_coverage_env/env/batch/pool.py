@@ -24,7 +24,9 @@ from uas_coverage_env.env.episode.memory import (
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.features.feature import Feature, fitted_to, in_slots
-from uas_coverage_env.scenario import Room, Scenario, loaded_scenario
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.room import Room
+from uas_coverage_env.scenario.source import loaded_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.simulation.scenes import changes_scene
 from uas_coverage_env.world.arena import ARENA, Arena, build_arena

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.control import write_brake
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
-from uas_coverage_env.entities.commands import CLIMB, GO_TO, HOME, VELOCITY
-from uas_coverage_env.entities.state import STATE
+from uas_coverage_env.entities.commands import CLIMB, COMMAND_DTYPE, GO_TO, HOME, VELOCITY
+from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.episode.memory import (
     ADDRESS,
@@ -27,7 +27,6 @@ from uas_coverage_env.env.episode.memory import (
     WHICH,
     Acting,
 )
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING
 from uas_coverage_env.world.arena import ARENA
 
 Kinds = tuple[ActionKind, ...]

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.actions import Actions
 from uas_coverage_env.env.episode.memory import (
     FIRST_OBSERVATION,
@@ -22,7 +23,7 @@ from uas_coverage_env.env.observation.scales import scales_of
 from uas_coverage_env.env.report import CONTACT_WITH, COVERED, FIRST_TERM, STATUS
 from uas_coverage_env.env.versions import Version
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import FLYING, Arena, WorldState
+from uas_coverage_env.world import Arena, WorldState
 from uas_coverage_env.world.arena import ARENA
 
 

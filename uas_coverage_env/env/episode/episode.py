@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.episode.act import acting_of, is_own, refuse_what_it_wrote
@@ -19,7 +19,8 @@ from uas_coverage_env.env.episode.pay import paying_of
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.episode.step import ACCEPTED, step_episode_with
 from uas_coverage_env.env.observation.own import OWN
-from uas_coverage_env.scenario import Room, Scenario
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.room import Room
 from uas_coverage_env.simulation import World
 from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.world import SwarmState

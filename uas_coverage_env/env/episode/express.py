@@ -6,10 +6,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import velocity_of
+from uas_coverage_env.autopilot.guidance import velocity_of
+from uas_coverage_env.entities.commands import pack
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.actions import Actions
 from uas_coverage_env.env.episode.memory import Learners, Tables
-from uas_coverage_env.world import FLYING, Arena, Command, GoTo, WorldState, pack
+from uas_coverage_env.world import Arena, Command, GoTo, WorldState
 
 _ROUNDING = 1e-9
 """A number this far beyond its range, as a share of it, is at the end of it."""

@@ -12,10 +12,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import LANDED, LOST, SWAPPING
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.observation.own import OWN
-from uas_coverage_env.scenario import Room
-from uas_coverage_env.world import LANDED, LOST, SWAPPING
+from uas_coverage_env.scenario.room import Room
 
 _MOVING_BOUND = 2.0
 _MOVING_MPS = 20.0

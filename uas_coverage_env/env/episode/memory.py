@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory, Values, record_dtype
 from uas_coverage_env.compiled.views import Layout
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.observation.nearest import N_AROUND, NEIGHBOURS_DTYPE, NO_TARGET
 from uas_coverage_env.env.observation.notes import NOTES_DTYPE
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS, SCALES_DTYPE
 from uas_coverage_env.env.report import REPORT_SIZE
-from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE
 from uas_coverage_env.world.arena import ARENA
 
 LOWEST, MIDDLE, HIGHEST = range(3)

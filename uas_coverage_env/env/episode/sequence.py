@@ -11,7 +11,8 @@ from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.env.episode.episode import Episode
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.files.suggestions import meant
-from uas_coverage_env.scenario import MissionSource, Scenario, ScenarioLike
+from uas_coverage_env.scenario import MissionSource, Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 
 
 class MissionSequence:

@@ -15,7 +15,7 @@ from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.features.feature import Feature, checked_features
 from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.simulation.world import DynamicsName
 from uas_coverage_env.world.packs import mission_features
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -36,7 +36,7 @@ class MissionKeywords(TypedDict, total=False):
     """The keyword arguments of all environments, with their types: see `MissionSettings`."""
 
     action: str | ActionKind
-    dynamics: Dynamics
+    dynamics: DynamicsName
     return_mode: bool
     safety_filter: bool
     reward_weights: Mapping[str, float] | None
@@ -89,7 +89,7 @@ class MissionSettings:
     """
 
     action: str | ActionKind = "velocity"
-    dynamics: Dynamics = "lpv"
+    dynamics: DynamicsName = "lpv"
     return_mode: bool = False
     safety_filter: bool = False
     reward_weights: Mapping[str, float] | None = None
@@ -105,8 +105,8 @@ class MissionSettings:
     def __post_init__(self) -> None:
         version = self.version
         version.kind_of(self.action)
-        if self.dynamics not in get_args(Dynamics):
-            allowed = ", ".join(get_args(Dynamics))
+        if self.dynamics not in get_args(DynamicsName):
+            allowed = ", ".join(get_args(DynamicsName))
             raise ValueError(f"dynamics is {self.dynamics!r}; it is one of {allowed}")
         if self.flat_infos is None:
             object.__setattr__(self, "flat_infos", version.flat_infos)

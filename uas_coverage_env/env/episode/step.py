@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
-from uas_coverage_env.entities.state import SWAPPING, as_observed
+from uas_coverage_env.entities.state import FLYING, SWAPPING, as_observed
 from uas_coverage_env.env.episode.act import first_not_finite, write_commands_with
 from uas_coverage_env.env.episode.memory import EPISODE, Acting, Observing, Paying
 from uas_coverage_env.env.episode.observe import observe_one_with
@@ -24,8 +24,7 @@ from uas_coverage_env.env.report import (
     STATUS,
 )
 from uas_coverage_env.env.versions import Version
-from uas_coverage_env.simulation import advance
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.simulation.step import advance
 
 ACCEPTED = -1
 

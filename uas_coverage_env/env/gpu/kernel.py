@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.views import copy_arrays, lane_view
-from uas_coverage_env.entities.state import STATE, as_observed
+from uas_coverage_env.entities.state import FLYING, STATE, SWAPPING, as_observed
 from uas_coverage_env.env.batch.pool import (
     ScenarioPool,
     first_learners_at,
@@ -40,7 +40,7 @@ from uas_coverage_env.simulation.flight import check_all, fly_still, move_all, w
 from uas_coverage_env.simulation.on_gpu import called_at, called_at_begin
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
 from uas_coverage_env.simulation.step import begin_step, judge
-from uas_coverage_env.world import FLYING, SWAPPING, WorldState
+from uas_coverage_env.world import WorldState
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import begin_events
 

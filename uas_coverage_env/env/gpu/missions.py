@@ -34,7 +34,8 @@ from uas_coverage_env.env.gpu.device import (
     write_lane,
 )
 from uas_coverage_env.env.gpu.kernel import Missions, new_missions, step_with
-from uas_coverage_env.scenario import Scenario, installed_families
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import goes_home
 

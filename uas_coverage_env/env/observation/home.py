@@ -2,6 +2,7 @@
 
 from uas_coverage_env.autopilot.guidance import target_position
 from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.entities.commands import HOME as HOME_TARGET
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.relative import close, direction, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M
@@ -11,7 +12,6 @@ from uas_coverage_env.vehicle.range import (
     TravelTimeModel,
     flight_seconds,
 )
-from uas_coverage_env.world import HOME as HOME_TARGET
 from uas_coverage_env.world.routes import shortest_way
 
 OBSERVED = TravelTimeModel(in_turn=True)

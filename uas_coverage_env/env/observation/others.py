@@ -1,6 +1,7 @@
 """The other UAS that fly nearest to a UAS."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, stack_array
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -18,7 +19,6 @@ from uas_coverage_env.env.observation.relative import (
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_UAS
 from uas_coverage_env.env.observation.sorted_list import insert
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING
 
 _FEATURES = (
     flag("valid", "1 for a flying UAS; all are 0 where there is none"),

@@ -1,14 +1,14 @@
 """The UAS itself: where it is, how it moves, what its battery holds, and how much is left to do."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.home import note_way_home
 from uas_coverage_env.env.observation.relative import charge_left, within
 from uas_coverage_env.env.observation.remaining import note_open_weight
 from uas_coverage_env.env.observation.scales import MARGIN
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle import within_half_turn
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.vehicle.inner_loop import within_half_turn
 
 _FEATURES = (
     Feature("position", 3, -1, 1, "north, east, up in the box around the fence; ±1: its sides"),

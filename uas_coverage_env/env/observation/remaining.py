@@ -6,7 +6,7 @@ from uas_coverage_env.env.observation.block import Feature, Group, ObservationBl
 from uas_coverage_env.env.observation.notes import EAST, N_SECTORS, NORTH
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import FAR_M
-from uas_coverage_env.vehicle import X, Y
+from uas_coverage_env.vehicle.layout import X, Y
 from uas_coverage_env.world.waypoints import (
     ALL_SHARES,
     EAST_M,

@@ -7,7 +7,7 @@ from uas_coverage_env.compiled.views import rows_view, slice_view
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, N_RAYS, RAY_M
-from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.broad_phase import (
     BLOCK,

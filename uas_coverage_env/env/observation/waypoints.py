@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, stack_array, stack_array_f32
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -16,7 +17,6 @@ from uas_coverage_env.env.observation.nearest import DENSITY, NEXT
 from uas_coverage_env.env.observation.relative import STRAIGHT_M, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_WAYPOINTS, MARGIN, NEARBY_M
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, WEIGHT
 
 _ZERO, _ONE, _INFINITE = np.float32(0.0), np.float32(1.0), np.float32(math.inf)

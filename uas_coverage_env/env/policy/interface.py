@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.entities.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH, Mode
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.actions import actions_of
 from uas_coverage_env.env.episode.act import (
     Kinds,
@@ -26,7 +27,7 @@ from uas_coverage_env.env.observation.nearest import write_around
 from uas_coverage_env.env.report import FIRST_TERM
 from uas_coverage_env.mission import MissionBrief, WorldView
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import FLYING, Acceleration, Command, GoTo, SwarmState, Velocity, Wrench
+from uas_coverage_env.world import Acceleration, Command, GoTo, SwarmState, Velocity, Wrench
 
 
 @cache

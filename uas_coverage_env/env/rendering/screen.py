@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import Picture, Window, window_possible
+from uas_coverage_env.draw import Picture
+from uas_coverage_env.draw.window import Window, window_possible
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import SwarmState
 

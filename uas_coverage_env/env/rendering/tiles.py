@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import Window
+from uas_coverage_env.draw.window import Window
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, Screen
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import SwarmState

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.labels import Box, free_place, overlap, short_name
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, Flight, SceneHistory, SeenGround, seen_ground
+from uas_coverage_env.flight import MODES, Flight, seen_ground
+from uas_coverage_env.flight.scene_history import SceneHistory
+from uas_coverage_env.flight.seen import SeenGround
 from uas_coverage_env.replay.figures.map_legend import LANDED, LOST, SEEN_ALPHA, legend_of
 from uas_coverage_env.replay.figures.style import (
     MANY,
@@ -28,7 +30,7 @@ from uas_coverage_env.replay.figures.style import (
 )
 from uas_coverage_env.replay.outline import outline_of
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import PSI
+from uas_coverage_env.vehicle.layout import PSI
 
 _LEGEND_IN = 0.2
 _LEGEND_ROW_IN = 0.175

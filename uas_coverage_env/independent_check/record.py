@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-_SHIPPED = Path(__file__).parents[1] / "uas_coverage_env" / "vehicle"
+_SHIPPED = Path(__file__).parents[1] / "vehicle"
 
 FLYING_MODES = ("covering", "transit", "return")
 NUMBERS = (

@@ -1,5 +1,7 @@
-"""`uas-coverage planners`: what can fly, and how it can be set."""
+"""`uas-coverage planner list`: what can fly, and how it can be set."""
 
+import json
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -9,10 +11,11 @@ from rich.table import Table
 
 from uas_coverage_env.cli import completion
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.flight import PlannerDescription, describe_planner, describe_planners
+from uas_coverage_env.flight import describe_planners
+from uas_coverage_env.flight.registry import PlannerDescription, describe_planner
 
 
-def planners(
+def list_planners(
     name: Annotated[
         str | None,
         typer.Argument(
@@ -21,9 +24,14 @@ def planners(
             autocompletion=completion.planners,
         ),
     ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for machines.")] = False,
 ) -> None:
     """List the planners and their options (set them with `run --option key=value`)."""
     out = console()
+    if as_json:
+        found = [describe_planner(name)] if name else describe_planners()
+        typer.echo(json.dumps([asdict(planner) for planner in found], indent=2))
+        return
     if name is not None:
         _describe(out, describe_planner(name))
         return

@@ -1,4 +1,4 @@
-"""`uas-coverage scenarios`: the missions that are shipped, and a check of one's own."""
+"""`uas-coverage scenario`: the missions that are shipped, a check of one's own, and a new one."""
 
 import math
 import sys
@@ -13,21 +13,26 @@ from PIL.PngImagePlugin import PngInfo
 from rich.table import Table
 
 from uas_coverage_env.cli import completion
+from uas_coverage_env.cli.options import (
+    ReplaceFileOption,
+    ScenarioArgument,
+    check_new_toml,
+    scenario_name,
+)
 from uas_coverage_env.cli.output import console, loaded
-from uas_coverage_env.draw import legend, picture
+from uas_coverage_env.draw import picture
+from uas_coverage_env.draw.signs import legend
 from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.left_open import too_long
-from uas_coverage_env.mission import Access, Errands, MissionBrief
-from uas_coverage_env.scenario import (
-    Scenario,
-    Uas,
-    installed_families,
-    load_scenario,
-    out_of_reach,
-    scenario_names,
-)
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.access import Access
+from uas_coverage_env.mission.errands import Errands
+from uas_coverage_env.scenario import Scenario, Uas, load_scenario, scenario_names
+from uas_coverage_env.scenario.checks import out_of_reach
+from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.simulation import World
+from uas_coverage_env.tasks.levels import LEVELS
 from uas_coverage_env.vehicle.tube import tube_of
 from uas_coverage_env.world.arena import lookahead_steps
 from uas_coverage_env.world.obstacles import ROUTE_MARGIN_M
@@ -38,21 +43,12 @@ _NAMED, _NAMED_IN_WARNINGS = 8, 50
 _SLOWLY_S = 3.0
 """In this time a UAS brakes that creeps up to a waypoint."""
 # what we write into a picture, so that it may be drawn again; other files are left alone
-_MARK = ("Software", "uas-coverage scenarios check")
-
-app = typer.Typer(invoke_without_command=True, help="List the shipped scenarios, or check one.")
-
-
-@app.callback()
-def scenarios(context: typer.Context) -> None:
-    """List the shipped scenarios; `check FILE` validates and draws one."""
-    if context.invoked_subcommand is None:
-        list_scenarios()
+_MARK = ("Software", "uas-coverage scenario check")
+_FORMER_MARK = ("Software", "uas-coverage scenarios check")
 
 
-@app.command("list")
 def list_scenarios() -> None:
-    """List the shipped scenarios, and what generates others."""
+    """List the shipped scenarios, the families that draw others, and the levels."""
     table = Table("name", "UAS", "waypoints", "obstacles", "moving", "size, m", "steps", box=None)
     for name in scenario_names():
         scenario = load_scenario(name)
@@ -64,9 +60,10 @@ def list_scenarios() -> None:
     out.print(table)
     by_seed = ", ".join(f"{family}:SEED" for family in installed_families())
     out.print(f"by a seed: {by_seed}", markup=False)
+    for level, task in LEVELS.items():
+        out.print(f"level {level}: {task.meaning}", markup=False)
 
 
-@app.command()
 def check(
     file: Annotated[
         str,
@@ -115,6 +112,23 @@ def check(
     for line in _far(scenario, access):
         out.print(f"charge     {line}", markup=False)
     out.print(f"drawn in {path}", markup=False)
+
+
+def new(
+    scenario: ScenarioArgument,
+    out: Annotated[Path, typer.Option(help="Scenario file to write.")],
+    overwrite: ReplaceFileOption = False,
+) -> None:
+    """Write a scenario to a file, to begin one's own with.
+
+    `scenario new town:7 --out mine.toml` has the town that is drawn from the seed 7; its keys are
+    in docs/scenario_keys.md, and `scenario check` validates what becomes of it.
+    """
+    check_new_toml(out, overwrite=overwrite)
+    mission = load_scenario(scenario).model_copy(update={"name": scenario_name(out)})
+    mission.to_file(out)
+    said = f"scenario in {out}; to draw it: uas-coverage scenario check {out}"
+    console().print(said, markup=False)
 
 
 def _closed_off(scenario: Scenario, access: Access) -> Iterator[str]:
@@ -178,7 +192,7 @@ def _signs(scenario: Scenario) -> set[str]:
 def _drawn_by_us(path: Path) -> bool:
     try:
         with Image.open(path) as drawn:
-            return (_MARK[0], _MARK[1]) in drawn.info.items()
+            return any(mark in drawn.info.items() for mark in (_MARK, _FORMER_MARK))
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError):
         return False
 

@@ -1,6 +1,10 @@
-"""Rows of flights that nobody has flown."""
+"""Rows of flights: of such as nobody has flown, and of those that a folder holds."""
 
-from uas_coverage_env.leaderboard import FAILED, FLOWN, Row
+import dataclasses
+from pathlib import Path
+
+from uas_coverage_env.leaderboard import FAILED, FLOWN, TIMES, Row
+from uas_coverage_env.runner import rows_in
 
 
 def row(scenario="a", label="p", seed=0, **changes) -> Row:
@@ -9,6 +13,7 @@ def row(scenario="a", label="p", seed=0, **changes) -> Row:
         "key": f"{scenario}/{label}/{seed}",
         "scenario": scenario,
         "scenario_sha256": "00",
+        "level": "",
         "label": label,
         "planner": label,
         "options": "{}",
@@ -17,9 +22,14 @@ def row(scenario="a", label="p", seed=0, **changes) -> Row:
         "safety_filter": False,
         "status": FLOWN,
         "reason": None,
+        "verdict": None,
+        "failed_figures": None,
         "accomplished": True,
         "coverage": 1.0,
         "all_home": True,
+        "n_uas": 1,
+        "home": 1,
+        "lost": 0,
         "violations": 0,
         "breaches": 0,
         "steps": 100,
@@ -40,7 +50,7 @@ def row(scenario="a", label="p", seed=0, **changes) -> Row:
     return Row(**{**usual, **changes})
 
 
-def failed_row(scenario="a", label="p", seed=0, reason="refused") -> Row:
+def failed_row(scenario="a", label="p", seed=0, reason="refused", **changes) -> Row:
     """A flight that there is none of."""
     nothing = dict.fromkeys(
         (
@@ -55,5 +65,11 @@ def failed_row(scenario="a", label="p", seed=0, reason="refused") -> Row:
     return row(
         *(scenario, label, seed),
         **{"status": FAILED, "reason": reason, "accomplished": False, "coverage": 0.0},
-        **{"all_home": False, "wall_time_s": None, **nothing},
+        **{"all_home": False, "home": 0, "wall_time_s": None, **nothing, **changes},
     )
+
+
+def flights_in(out) -> list[Row]:
+    """What a folder holds, apart from times; somebody may edit the source while a test runs."""
+    same = dict.fromkeys((*TIMES, "source_sha256"))
+    return [dataclasses.replace(one, **same) for one in rows_in(Path(out), Row)]

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from flight_record import FlightRecord, Track
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
+
+from uas_coverage_env.independent_check.record import FlightRecord, Track
 
 FloatArray = NDArray[np.float64]
 Distance = Callable[[FloatArray], FloatArray]

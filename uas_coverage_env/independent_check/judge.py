@@ -1,26 +1,17 @@
-"""An independent check of a flight directory, between the samples too.
-
-    python benchmarks/independent_check.py DIR [DIR ...]
-
-It shares no code with the world, the planners or the writer of the files: what is in the
-directory is judged anew from the scenario, with NumPy and SciPy alone, and compared with
-`summary.json`. See `docs/safety.md` for what is checked.
-
-Exits 0 where nothing was touched and everything agrees, 1 otherwise, 2 where a directory is no
-flight.
-"""
+"""A flight directory judged anew, between the samples too; see `docs/safety.md`."""
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from flight_distances import (
+from numpy.typing import NDArray
+from scipy.spatial import QhullError
+
+from uas_coverage_env.independent_check.distances import (
     Partner,
     curve,
     on_curves,
@@ -30,10 +21,13 @@ from flight_distances import (
     scheduled,
     too_low,
 )
-from flight_limits import inputs_beyond, limits_exceeded
-from flight_record import BadFlightError, FlightRecord, Track, read_record
-from numpy.typing import NDArray
-from scipy.spatial import QhullError
+from uas_coverage_env.independent_check.limits import inputs_beyond, limits_exceeded
+from uas_coverage_env.independent_check.record import (
+    BadFlightError,
+    FlightRecord,
+    Track,
+    read_record,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -60,12 +54,14 @@ class Report:
         height_breaches: How many of these are below the least height.
         straight_room_m: Kind -> smallest distance left before a contact, straight segments.
         curved_room_m: The same on the cubic curve through positions and velocities.
-        problems: Every disagreement, contact and oddity, a line each.
+        disagreements: What the flight or its summary says and the check does not, and what does not
+            fit together, a line each.
+        touched: Contacts, limits exceeded, and what comes too close between samples, a line each.
     """
 
     coverage: float = 0.0
     steps: int = 0
-    energy_Wh: float = 0.0  # noqa: N815
+    energy_Wh: float = 0.0
     all_home: bool = False
     contacts: list[tuple[float, str, str, str | None]] = field(default_factory=list)
     limits: list[tuple[float, str, str, str]] = field(default_factory=list)
@@ -73,7 +69,13 @@ class Report:
     height_breaches: int = 0
     straight_room_m: dict[str, float] = field(default_factory=dict)
     curved_room_m: dict[str, float] = field(default_factory=dict)
-    problems: list[str] = field(default_factory=list)
+    disagreements: list[str] = field(default_factory=list)
+    touched: list[str] = field(default_factory=list)
+
+    @property
+    def problems(self) -> list[str]:
+        """Every disagreement, contact and oddity, a line each."""
+        return [*self.disagreements, *self.touched]
 
 
 def check(directory: Path, plan_tolerance_m: float = PLAN_TOLERANCE_M) -> Report:
@@ -117,7 +119,7 @@ def _judge_distances(record: FlightRecord, report: Report) -> None:
     report.contacts = sorted(contact for found in touched for contact in found.values())
     smallest: dict[str, float] = {}
     for row, track in enumerate(record.tracks):
-        report.problems += _end_without_cause(track, touched[row])
+        report.disagreements += _end_without_cause(track, touched[row])
         for partner, distance in zip(partners[row], straight[row], strict=True):
             kind = partner.kind
             _keep_least(smallest, kind, distance)
@@ -126,7 +128,7 @@ def _judge_distances(record: FlightRecord, report: Report) -> None:
             curved = _in_flight(curved, track.name, partner, rests)
             _keep_least(report.curved_room_m, kind, curved)
             for step in np.flatnonzero((curved < -_SAME) & (distance >= partner.contact_m)):
-                report.problems.append(
+                report.touched.append(
                     f"{track.name} is {-curved[step]:.3g} m too close to "
                     f"{partner.name or 'the fence'} on the curve from {step * dt_s:g} s"
                 )
@@ -199,7 +201,7 @@ def _compare_smallest(summary: dict[str, Any], smallest: dict[str, float], repor
     ):
         theirs = summary[key]
         if (mine is None) != (theirs is None) or (mine is not None and abs(mine - theirs) > _SAME):
-            report.problems.append(f"{key} is {mine}, the summary says {theirs}")
+            report.disagreements.append(f"{key} is {mine}, the summary says {theirs}")
 
 
 def _judge_coverage(record: FlightRecord, report: Report) -> None:
@@ -221,7 +223,7 @@ def _judge_coverage(record: FlightRecord, report: Report) -> None:
         wrong = np.flatnonzero(counted != track.columns["covered"])
         if len(wrong):
             step = wrong[0]
-            report.problems.append(
+            report.disagreements.append(
                 f"{track.name}: {counted[step]} waypoints are covered at {step * record.dt_s:g} s, "
                 f"its row says {track.columns['covered'][step]:g}"
             )
@@ -258,12 +260,12 @@ def _judge_tracks(record: FlightRecord, report: Report) -> None:
     for track in record.tracks:
         power_W = track.columns["voltage_V"] * track.columns["current_A"]
         report.energy_Wh += float(power_W.sum()) * record.dt_s / 3600.0
-        report.problems += [f"{track.name} {what}" for what in _oddities(track, record)]
+        report.disagreements += [f"{track.name} {what}" for what in _oddities(track, record)]
     times_s = np.arange(record.steps + 1, dtype=np.float64) * record.dt_s
     for m, moving in enumerate(record.scenario["moving_obstacles"]):
         off = np.abs(record.moving_m[:, m] - scheduled(moving, times_s)).max()
         if off > _SAME:
-            report.problems.append(f"{moving['name']} is {off:.3g} m off its schedule")
+            report.disagreements.append(f"{moving['name']} is {off:.3g} m off its schedule")
 
 
 def _oddities(track: Track, record: FlightRecord) -> Iterator[str]:
@@ -341,14 +343,14 @@ def _judge_plan(record: FlightRecord, report: Report, tolerance_m: float) -> Non
     tracks = {track.name: track for track in record.tracks}
     for (step, name), path in record.plan.items():
         if step >= tracks[name].steps:
-            report.problems.append(
+            report.disagreements.append(
                 f"{name} has a plan at {step * record.dt_s:g} s, flown by no UAS"
             )
             continue
         flown = tracks[name].position_m[step : step + 2][: len(path)]
         off = np.abs(flown - path[:2]).max()
         if off > tolerance_m:
-            report.problems.append(
+            report.disagreements.append(
                 f"the plan of {name} at {step * record.dt_s:g} s is {off:.3g} m off what was flown"
             )
 
@@ -358,59 +360,17 @@ def _compare(summary: dict[str, Any], report: Report) -> None:
     for key, tolerance in (("coverage", 1e-9), ("steps", 0), ("energy_Wh", _SAME)):
         mine = getattr(report, key)
         if not abs(mine - summary[key]) <= tolerance:
-            report.problems.append(f"{key} is {mine}, the summary says {summary[key]}")
+            report.disagreements.append(f"{key} is {mine}, the summary says {summary[key]}")
     for key in ("all_home", "breaches", "height_breaches"):
         mine, theirs = getattr(report, key), summary.get(key, 0)
         if mine != theirs:
-            report.problems.append(f"{key} is {mine}, the summary says {theirs}")
+            report.disagreements.append(f"{key} is {mine}, the summary says {theirs}")
     theirs = [(v["t_s"], v["uas"], v["kind"], v["with"]) for v in summary["violations"]]
     mine = [*report.contacts, *report.limits]
     if sorted(map(repr, theirs)) != sorted(map(repr, mine)):
-        report.problems.append(f"violations are {mine}, the summary says {theirs}")
+        report.disagreements.append(f"violations are {mine}, the summary says {theirs}")
     for time_s, uas, kind, partner in report.contacts:
         with_whom = f" with {partner}" if partner else ""
-        report.problems.append(f"{uas}: {kind} contact{with_whom} at {time_s:g} s")
+        report.touched.append(f"{uas}: {kind} contact{with_whom} at {time_s:g} s")
     for time_s, uas, _, name in report.limits:
-        report.problems.append(f"{uas}: beyond its limit of {name} from {time_s:g} s on")
-
-
-def _text(directory: Path, report: Report) -> str:
-    lines = [
-        f"{directory}: covered {report.coverage:.1%} in {report.steps} steps, "
-        f"{report.energy_Wh:.3f} Wh, {'all' if report.all_home else 'not all'} home, "
-        f"{len(report.contacts)} contacts, {len(report.limits)} limits exceeded, "
-        f"{report.breaches} breaches"
-    ]
-    for kind, straight in report.straight_room_m.items():
-        curved = report.curved_room_m[kind]
-        lines.append(f"  room left to {kind}: straight {straight:.3f} m, curved {curved:.3f} m")
-    lines += [f"  problem: {problem}" for problem in report.problems]
-    return "\n".join([*lines, "  FAILED" if report.problems else "  agrees, nothing touched"])
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Check flight directories; the exit code."""
-    parser = argparse.ArgumentParser(description="Check flight directories independently.")
-    parser.add_argument("directories", metavar="DIR", nargs="+", type=Path)
-    parser.add_argument(
-        *("--plan-tolerance-m", "-p"),
-        type=float,
-        default=PLAN_TOLERANCE_M,
-        help="how far a plan's first step may be from what was flown; more for nonlinear "
-        "flights and for those with disturbances",
-    )
-    arguments = parser.parse_args(argv)
-    clean = True
-    for directory in arguments.directories:
-        try:
-            report = check(directory, arguments.plan_tolerance_m)
-        except BadFlightError as error:
-            sys.stderr.write(f"error: {error}\n")
-            return 2
-        sys.stdout.write(_text(directory, report) + "\n")
-        clean = clean and not report.problems
-    return 0 if clean else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        report.touched.append(f"{uas}: beyond its limit of {name} from {time_s:g} s on")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from flight_record import FlightRecord, Track
 from numpy.typing import NDArray
+
+from uas_coverage_env.independent_check.record import FlightRecord, Track
 
 FloatArray = NDArray[np.float64]
 

@@ -1,0 +1,178 @@
+"""Many missions side by side: what a job is, who does it, and what becomes of one that is lost."""
+
+import os
+import pickle
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol, Self
+
+from uas_coverage_env.files.errors import InputError
+
+Backend = Literal["process", "ray"]
+
+_MOST_LOSSES = 3
+
+
+class WorkerLostError(Exception):
+    """A job's process was lost again and again; all other jobs were done."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A call that any process can make.
+
+    Attributes:
+        key: By which it is known.
+        call: A function of a module.
+        arguments: What it takes; like the function and its result, they can be pickled.
+    """
+
+    key: str
+    call: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A job whose process is gone.
+
+    Attributes:
+        reason: As far as it is known.
+    """
+
+    reason: str
+
+
+class Crew(Protocol):
+    """Processes that do jobs, here or on other machines."""
+
+    def size(self) -> int:
+        """How many jobs it takes now, those under way included."""
+        ...
+
+    def begin(self, job: Job, work: bytes) -> None:
+        """Take a job; the work is for `done`."""
+        ...
+
+    def finished(self) -> list[tuple[Job, bytes | Lost]]:
+        """Wait until there is news; what `done` gave, or what was lost."""
+        ...
+
+    def abandon(self) -> None:
+        """Stop what is under way."""
+        ...
+
+    def close(self) -> None:
+        """End; stop what is under way."""
+        ...
+
+
+class Workers:
+    """Who does jobs: this process, processes beside it, or a Ray cluster.
+
+    Processes are started when there is work for them, and wait for more until it is closed.
+
+    Args:
+        count: Jobs side by side; 1: in this process, unless Ray was asked for. None: as many as
+            this machine has cores, or the Ray cluster.
+        backend: `process`, or `ray`: the cluster of `RAY_ADDRESS`, or a local one.
+    """
+
+    def __init__(self, count: int | None = 1, backend: Backend = "process") -> None:
+        self.backend: Backend = backend
+        self.count = os.cpu_count() or 1 if count is None and backend == "process" else count
+        self._crew: Crew | None = None
+
+    def __str__(self) -> str:
+        """For people."""
+        if self.count is None:
+            return "as many flights side by side as the cluster has cores"
+        return f"{self.count} flight{'' if self.count == 1 else 's'} side by side"
+
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Any]]:
+        """Do jobs; each result as soon as it is there, in no particular order.
+
+        A job whose process was killed or whose machine is gone is done again by another one. What
+        a job raises is raised here.
+
+        Raises:
+            InputError: Ray cannot be used.
+            WorkerLostError: A job's process was lost each time; the other jobs were done first.
+        """
+        waiting, losses, given_up = deque(jobs), Counter[str](), list[tuple[Job, Lost]]()
+        if self.backend == "process" and self.count == 1:
+            for job in waiting:
+                yield job, job.call(*job.arguments)
+            return
+        crew, under_way = self._started() if waiting else None, 0
+        if crew is None:
+            return
+        try:
+            while waiting or under_way:
+                while waiting and under_way < crew.size():
+                    job = waiting.popleft()
+                    crew.begin(job, pickle.dumps((job.call, job.arguments)))
+                    under_way += 1
+                for job, result in crew.finished():
+                    under_way -= 1
+                    if isinstance(result, Lost):
+                        losses[job.key] += 1
+                        if losses[job.key] < _MOST_LOSSES:
+                            waiting.append(job)
+                        else:
+                            given_up.append((job, result))
+                        continue
+                    value, error = pickle.loads(result)
+                    if error is not None:
+                        raise error
+                    yield job, value
+        finally:
+            if under_way:
+                crew.abandon()
+        if given_up:
+            job, lost = given_up[0]
+            raise WorkerLostError(
+                f"{job.key}: {lost.reason}, {_MOST_LOSSES} times (out of memory?); "
+                "what was flown is kept"
+            )
+
+    def close(self) -> None:
+        """End the processes."""
+        crew, self._crew = self._crew, None
+        if crew is not None:
+            crew.close()
+
+    def __enter__(self) -> Self:
+        """The same."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Close it."""
+        self.close()
+
+    def _started(self) -> Crew:
+        if self._crew is None:
+            if self.backend == "ray":
+                from uas_coverage_env.runner.cluster import Cluster
+
+                self._crew = Cluster(self.count)
+            else:
+                from uas_coverage_env.runner.processes import Processes
+
+                self._crew = Processes(self.count or 1)
+        return self._crew
+
+
+def done(work: bytes) -> bytes:
+    """Do a job in a process of its own: its result and None, or None and what it raised."""
+    try:
+        call, arguments = pickle.loads(work)
+        return pickle.dumps((call(*arguments), None))
+    except Exception as error:  # it is the owner's, whatever it is
+        try:
+            pickled = pickle.dumps((None, error))
+            pickle.loads(pickled)  # some cannot be made from their arguments
+        except Exception:
+            return pickle.dumps((None, InputError(f"{type(error).__name__}: {error}")))
+        return pickled
