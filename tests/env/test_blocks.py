@@ -18,8 +18,9 @@ from uas_coverage_env.env import (
     REWARD,
     CoverageBatch,
     Feature,
+    MissionInterface,
+    MissionSettings,
     ObservationBlock,
-    Observer,
     RewardTerm,
     observation_bounds,
     observation_columns,
@@ -154,7 +155,7 @@ def test_a_planner_gets_the_same_observation_from_an_observer():
     ground = practice_ground(n_uas=2)
     env = uas_coverage_v0.parallel_env(ground, observation=OBSERVED)
     observations, _ = env.reset(seed=0)
-    observer = Observer(MissionBrief.of(ground), OBSERVED)
+    observer = MissionInterface(MissionBrief.of(ground), MissionSettings(observation=OBSERVED))
     np.testing.assert_array_equal(observer.observe(env.swarm_state()), list(observations.values()))
 
 

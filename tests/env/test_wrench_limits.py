@@ -19,7 +19,7 @@ from uas_coverage_env import (
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions.wrench import WRENCH
-from uas_coverage_env.env.memory import CONTACT
+from uas_coverage_env.env.report import CONTACT
 from uas_coverage_env.features.wind import Gust
 from uas_coverage_env.scenario import Waypoint, Wind
 from uas_coverage_env.vehicle import load_vehicle

@@ -99,7 +99,7 @@ import uas_coverage_env.features as features
 features.__path__.extend(sys.argv[1:])
 from uas_coverage_env import load_scenario
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.parallel import CoverageParallelEnv
+from uas_coverage_env.env.api.parallel import CoverageParallelEnv
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World

@@ -10,8 +10,8 @@ from uas_coverage_env.cli.output import console
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.draw import picture
-from uas_coverage_env.env.parallel import CoverageParallelEnv
-from uas_coverage_env.env.vector import CoverageVectorEnv
+from uas_coverage_env.env.api.parallel import CoverageParallelEnv
+from uas_coverage_env.env.api.vector import CoverageVectorEnv
 from uas_coverage_env.flight import Planner, load_planner, rollout
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, load_scenario

@@ -1,8 +1,13 @@
 """What a learner sees: environments for PettingZoo and Gymnasium on one world."""
 
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, ActionKind
-from uas_coverage_env.env.aec import env, raw_env
-from uas_coverage_env.env.batch import CoverageBatch
+from uas_coverage_env.env.api.aec import env, raw_env
+from uas_coverage_env.env.api.parallel import CoverageParallelEnv
+from uas_coverage_env.env.api.single import CoverageSwarmEnv
+from uas_coverage_env.env.api.vector import CoverageVectorEnv
+from uas_coverage_env.env.batch.batch import CoverageBatch
+from uas_coverage_env.env.batch.pool import ScenarioPool
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.observation import (
     K_WAYPOINTS,
     OBSERVATION,
@@ -18,13 +23,8 @@ from uas_coverage_env.env.observation import (
     observation_bounds,
     observation_columns,
 )
-from uas_coverage_env.env.observer import Observer
-from uas_coverage_env.env.parallel import CoverageParallelEnv
-from uas_coverage_env.env.pool import ScenarioPool
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.env.rewards import REWARD, REWARD_TERMS, RewardTerm, rewards_table
-from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.env.single import CoverageSwarmEnv
-from uas_coverage_env.env.vector import CoverageVectorEnv
 from uas_coverage_env.registration import GYMNASIUM_ID, PETTINGZOO_ID, register_environments
 
 __all__ = [
@@ -45,9 +45,9 @@ __all__ = [
     "CoverageSwarmEnv",
     "CoverageVectorEnv",
     "Feature",
+    "MissionInterface",
     "MissionSettings",
     "ObservationBlock",
-    "Observer",
     "RewardTerm",
     "ScenarioPool",
     "env",

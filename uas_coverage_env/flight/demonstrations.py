@@ -17,7 +17,7 @@ from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
-from uas_coverage_env.env.observer import Observer
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.loop import Progress, rollout
@@ -141,7 +141,7 @@ class Demonstrator:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._observer = Observer(MissionBrief.of(scenario))
+        self._observer = MissionInterface(MissionBrief.of(scenario))
         self._seen: list[_Seen] = []
 
     def __call__(self, progress: Progress) -> None:

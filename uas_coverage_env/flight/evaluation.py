@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.flight.figures import NOTHING, ByName, Figure, computed, figures, rows_part
 from uas_coverage_env.flight.flight import Flight, unless_stopped
 from uas_coverage_env.flight.loop import rollout

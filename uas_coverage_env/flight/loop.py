@@ -15,7 +15,8 @@ from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.entities.commands import pack
 from uas_coverage_env.entities.state import FLYING, LANDED
-from uas_coverage_env.env.meter import RewardMeter
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
 from uas_coverage_env.features import Feature
 from uas_coverage_env.features.of_scenario import features_of
@@ -141,7 +142,10 @@ def rollout(
             judges_wrenches=getattr(planner, "is_learner", False),
             seed=seed,
         )
-        meter = RewardMeter(world, reward, reward_weights) if reward or reward_weights else None
+        meter = None
+        if reward or reward_weights:
+            paid = MissionSettings(reward=tuple(reward), reward_weights=reward_weights)
+            meter = MissionInterface(world, paid)
         _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
@@ -200,7 +204,7 @@ def _is_uncertain(scenario: Scenario, disturbances: Sequence[Feature] | None) ->
 
 
 def _make_ready(
-    world: World, meter: RewardMeter | None, planner: Planner, brief: MissionBrief, seed: int
+    world: World, meter: MissionInterface | None, planner: Planner, brief: MissionBrief, seed: int
 ) -> None:
     """Compile what world and planner begin with, then put both at the start."""
     state = world.swarm_state()
@@ -210,7 +214,7 @@ def _make_ready(
     packed = pack(stay, state.names, state.active, len(state.uncovered))
     outcome = _stepped(world, packed)
     if meter is not None:
-        meter.terms(packed, outcome)
+        meter.reward_terms(packed, outcome)
     world.reset()
     warm_up = getattr(planner, "warm_up", None)
     try:

@@ -26,7 +26,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.flight import Planner, as_planner
 from uas_coverage_env.flight.figures import ByName, figures
 from uas_coverage_env.flight.policy import Policy, PolicyFunction

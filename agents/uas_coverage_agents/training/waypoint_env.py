@@ -28,7 +28,7 @@ from uas_coverage_agents.waypoint.team import (
 )
 from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.state_dict import (
+from uas_coverage_env.env.batch.state_dict import (
     Limits,
     check_like,
     check_values,

@@ -9,7 +9,7 @@ from uas_coverage_env.env.observation.layout import (
     observation_bounds,
     observation_columns,
 )
-from uas_coverage_env.env.observation.named import OBSERVATIONS, observation_named
+from uas_coverage_env.env.observation.named import OBSERVATIONS
 from uas_coverage_env.env.observation.own_senses import local
 from uas_coverage_env.env.observation.scales import K_MOVING, K_UAS, K_WAYPOINTS, SCALES
 from uas_coverage_env.env.observation.whole_mission import full_state, full_state_of
@@ -33,5 +33,4 @@ __all__ = [
     "local",
     "observation_bounds",
     "observation_columns",
-    "observation_named",
 ]

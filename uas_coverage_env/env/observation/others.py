@@ -1,6 +1,6 @@
 """The other UAS that fly nearest to a UAS."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.kernels import inlined_kernel, stack_array
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
@@ -35,8 +35,8 @@ _WIDTH = _GROUP.width
 
 
 @inlined_kernel
-def write_others(arena, state, tables, i, row):
-    """Write the group."""
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
     x = state.x[i]
     scale = tables.scales[i]
     index = stack_array(K_UAS)
@@ -60,12 +60,6 @@ def write_others(arena, state, tables, i, row):
         row[at + _AT.velocity] = within((other[S.VX] - x[S.VX]) * scale.per_v_xy, -2.0, 2.0)
         row[at + _AT.velocity + 1] = within((other[S.VY] - x[S.VY]) * scale.per_v_xy, -2.0, 2.0)
         row[at + _AT.charge_left] = charge_left(arena, state, nearest)
-
-
-@kernel
-def write(arena, state, tables, learners, i, parameters, row):
-    """Write the group, see `ObservationBlock`."""
-    write_others(arena, state, tables, i, row)
 
 
 OTHERS = ObservationBlock("others", K_UAS, _FEATURES, write)
