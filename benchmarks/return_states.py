@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from uas_coverage_env import GoTo, Scenario, World, generate_scenario
 from uas_coverage_env.autopilot.return_mode import has_to_return, seconds_home, seconds_to_keep
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.entities.state import CONSUMPTION, LANDED
-from uas_coverage_env.simulation.world import DynamicsName
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
 from uas_coverage_env.vehicle.layout import DOD, Z
 from uas_coverage_env.vehicle.stopping import stopping_of

@@ -52,11 +52,11 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
 from uas_coverage_env.autopilot.return_mode import seconds_home, seconds_to_keep
 from uas_coverage_env.autopilot.return_path import flight_home
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.entities.state import CONSUMPTION, LANDED
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
 from uas_coverage_env.scenario import with_disturbances
-from uas_coverage_env.simulation.world import DynamicsName
 from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.vehicle.range import dod_per_s

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
 from uas_coverage_env import Scenario, generate_scenario, load_planner, load_vehicle, rollout
-from uas_coverage_env.simulation.world import DynamicsName
+from uas_coverage_env.entities.codes import DynamicsName
 
 FIRST_SEED = 13000
 MOST_DOD, MOST_V, MOST_WH = 1e-6, 0.1, 1e-3

@@ -40,7 +40,11 @@ def test_no_page_and_no_file_of_ours_names_a_command_that_is_typed_no_more():
     former = re.compile(rf"uas-coverage ({'|'.join(commands)})\b")
     files = [path for name in PLACES for path in (ROOT / name).rglob("*")]
     files += [path for path in ROOT.glob("*.md") if path.name != "CHANGELOG.md"]
-    files = [path for path in files if path.suffix in READ and path.is_file()]
+    files = [
+        path
+        for path in files
+        if path.suffix in READ and path.is_file() and "_generated" not in path.parts
+    ]
     assert len(files) > 500
     found = {
         f"{path.relative_to(ROOT)}: {match[0]}"

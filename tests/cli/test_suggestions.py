@@ -21,10 +21,7 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
         (["scenario", "check", "Village"], "did you mean village?"),
         (["run", "generatd:5"], "did you mean generated:5?"),
         (["run", "twon:5"], "did you mean town:5?"),
-        (
-            ["figure", ".", "--kind", "maps"],
-            "Invalid value for '--kind': 'maps' is not one of 'map'",
-        ),
+        (["figure", ".", "--kind", "maps"], "--kind 'maps': did you mean map?"),
         (
             ["run", "village", "--seed", "-1"],
             "Invalid value for '--seed': '-1' should be greater than or equal to 0",

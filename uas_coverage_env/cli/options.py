@@ -10,9 +10,9 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 import typer
 
 from uas_coverage_env.cli import completion
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.runner import Backend
-from uas_coverage_env.simulation.world import DynamicsName
 
 Asked = TypeVar("Asked")
 Made = TypeVar("Made")

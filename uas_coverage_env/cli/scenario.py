@@ -44,7 +44,6 @@ _SLOWLY_S = 3.0
 """In this time a UAS brakes that creeps up to a waypoint."""
 # what we write into a picture, so that it may be drawn again; other files are left alone
 _MARK = ("Software", "uas-coverage scenario check")
-_FORMER_MARK = ("Software", "uas-coverage scenarios check")
 
 
 def list_scenarios() -> None:
@@ -192,7 +191,7 @@ def _signs(scenario: Scenario) -> set[str]:
 def _drawn_by_us(path: Path) -> bool:
     try:
         with Image.open(path) as drawn:
-            return any(mark in drawn.info.items() for mark in (_MARK, _FORMER_MARK))
+            return _MARK in drawn.info.items()
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError):
         return False
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.entities.commands import pack
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.env.episode.settings import MissionSettings
@@ -35,7 +36,6 @@ from uas_coverage_env.plugins.installed import version_of
 from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.simulation.world import DynamicsName
 from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 from uas_coverage_env.world.packs import swaps_alone

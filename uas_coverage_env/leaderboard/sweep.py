@@ -6,11 +6,11 @@ from functools import cached_property
 from importlib.metadata import version
 from typing import Any
 
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
 from uas_coverage_env.leaderboard.planner_specs import PlannerSpec
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation.world import DynamicsName
 
 PACKAGE = "uas-coverage-env"
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import (
@@ -50,7 +51,6 @@ from uas_coverage_env.world.packs import (
 )
 from uas_coverage_env.world.sensing import senses
 
-DynamicsName = Literal["lpv", "nonlinear"]
 StepCode = Callable[..., int]
 
 _OUTCOMES_IN_BLOCK = 256

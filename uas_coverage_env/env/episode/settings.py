@@ -8,6 +8,7 @@ from typing import Any, TypedDict, TypeVar, get_args, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.observation import ObservationBlock
 from uas_coverage_env.env.rewards import RewardTerm, weights_of
@@ -15,7 +16,6 @@ from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.features.feature import Feature, checked_features
 from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation.world import DynamicsName
 from uas_coverage_env.world.packs import mission_features
 
 F = TypeVar("F", bound=Callable[..., Any])
