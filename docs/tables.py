@@ -29,19 +29,15 @@ from uas_coverage_env.env import (
     CoverageSwarmEnv,
     CoverageVectorEnv,
 )
-from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
+from uas_coverage_env.env.actions import ACTIONS, HOME_CHOICE
+from uas_coverage_env.env.actions.given import actions_of
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 from uas_coverage_env.env.api.aec import in_turns
 from uas_coverage_env.env.api.documentation import with_settings_written_out
-from uas_coverage_env.env.observation import (
-    OBSERVATION,
-    OBSERVATION_SIZE,
-    full_state,
-    grid,
-    layout_table,
-    local,
-)
+from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE, full_state, grid, local
+from uas_coverage_env.env.observation.layout import layout_table
 from uas_coverage_env.env.rendering.screen import RENDER_MODES
-from uas_coverage_env.env.rewards import rewards_table
+from uas_coverage_env.env.rewards.terms import rewards_table
 from uas_coverage_env.flight import Why, figures
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.leaderboard.scores import columns

@@ -8,7 +8,9 @@ import pettingzoo
 import pytest
 
 from uas_coverage_env import uas_coverage_v0
-from uas_coverage_env.env import ACTION_NAMES, PETTINGZOO_ID, CoverageParallelEnv
+from uas_coverage_env.env import CoverageParallelEnv
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
+from uas_coverage_env.registration import PETTINGZOO_ID
 from uas_coverage_env.scenario import generate_scenario
 
 with warnings.catch_warnings():

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from practice_grounds import practice_ground
 
 from uas_coverage_env import GoTo, UasStatus, uas_coverage_v0
-from uas_coverage_env.env import ACTION_NAMES, HOME_CHOICE, K_WAYPOINTS
-from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env import HOME_CHOICE, K_WAYPOINTS
+from uas_coverage_env.env.actions.given import actions_of
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.wrench import WRENCH
 from uas_coverage_env.scenario import load_scenario

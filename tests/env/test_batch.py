@@ -7,11 +7,13 @@ from gymnasium.error import ResetNeeded
 from practice_grounds import practice_ground, with_roles
 
 from uas_coverage_env.entities.state import FLYING, LOST
-from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
+from uas_coverage_env.env import CoverageBatch, CoverageParallelEnv
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 from uas_coverage_env.env.batch.kernel import ABSENT, drawn
+from uas_coverage_env.env.batch.pool import ScenarioPool
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.report import CONTACT, ENERGY, FIRST_TERM, LIMITS, STATUS
-from uas_coverage_env.env.rewards import REWARD_TERMS
+from uas_coverage_env.env.rewards.terms import REWARD_TERMS
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
 from uas_coverage_env.world import build_arena

@@ -22,10 +22,10 @@ from uas_coverage_env.env import (
     MissionSettings,
     ObservationBlock,
     RewardTerm,
-    observation_bounds,
     observation_columns,
 )
 from uas_coverage_env.env.actions.velocity import VELOCITY
+from uas_coverage_env.env.observation.layout import observation_bounds
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle.layout import VX, VY, X, Y

@@ -12,7 +12,6 @@ from practice_grounds import practice_ground
 from uas_coverage_env import uas_coverage_v0
 from uas_coverage_env.env import (
     OBSERVATION,
-    OBSERVATIONS,
     CoverageBatch,
     ObservationBlock,
     full_state,
@@ -21,6 +20,7 @@ from uas_coverage_env.env import (
     local,
     observation_columns,
 )
+from uas_coverage_env.env.observation.named import OBSERVATIONS
 from uas_coverage_env.env.observation.surroundings import SURROUNDINGS
 from uas_coverage_env.env.observation.waypoints import WAYPOINTS
 from uas_coverage_env.flight import as_planner, rollout

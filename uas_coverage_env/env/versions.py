@@ -6,7 +6,8 @@ from types import MappingProxyType
 from typing import Any
 
 from uas_coverage_env.env.actions import ACTIONS, ActionKind
-from uas_coverage_env.env.observation import OBSERVATION, OBSERVATIONS, ObservationBlock
+from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
+from uas_coverage_env.env.observation.named import OBSERVATIONS
 from uas_coverage_env.env.report import INFOS, InfoField
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
 

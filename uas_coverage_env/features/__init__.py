@@ -6,15 +6,15 @@ points of the step (`feature.Point`).
 
 from uas_coverage_env.compiled.random import normal, uniform
 from uas_coverage_env.features.event import OfUas
-from uas_coverage_env.features.feature import Disturbance, Feature, Point
+from uas_coverage_env.features.feature import Disturbance, MissionFeature, Point
 from uas_coverage_env.features.of_scenario import disturbances_of
 from uas_coverage_env.features.steady_wind import constant_wind
 from uas_coverage_env.features.table import FeatureTable
 
 __all__ = [
     "Disturbance",
-    "Feature",
     "FeatureTable",
+    "MissionFeature",
     "OfUas",
     "Point",
     "constant_wind",

@@ -19,7 +19,7 @@ from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
-from uas_coverage_env.features import Feature
+from uas_coverage_env.features import MissionFeature
 from uas_coverage_env.features.of_scenario import features_of
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
@@ -75,7 +75,7 @@ def rollout(
     return_mode: bool | None = None,
     safety_filter: bool | None = None,
     max_steps: int | None = None,
-    disturbances: Sequence[Feature] | None = None,
+    disturbances: Sequence[MissionFeature] | None = None,
     reward: Sequence[RewardTerm] = REWARD,
     reward_weights: Mapping[str, float] | None = None,
     on_step: Callable[[Progress], object] | None = None,
@@ -196,7 +196,7 @@ def _with_reasons(flight: Flight, planner: Planner) -> Flight:
     return dataclasses.replace(flight, left_open=left_open(flight, said))
 
 
-def _is_uncertain(scenario: Scenario, disturbances: Sequence[Feature] | None) -> bool:
+def _is_uncertain(scenario: Scenario, disturbances: Sequence[MissionFeature] | None) -> bool:
     """Whether anything may push back."""
     if disturbances is not None:
         return bool(features_of(scenario, disturbances))

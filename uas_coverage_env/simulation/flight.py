@@ -15,7 +15,7 @@ from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, rarely
 from uas_coverage_env.entities.commands import WRENCH
 from uas_coverage_env.entities.state import FLYING, as_estimated
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.simulation.points import (
     ACT,
     AT_BEGIN,
@@ -215,7 +215,7 @@ def move_all(arena, state, nonlinear, outcome):
         _note(arena, state, i, event, voltage_V, current_A)
 
 
-def feature_code(features: Sequence[Feature], *, otherwise: bool = False) -> FeatureCode:
+def feature_code(features: Sequence[MissionFeature], *, otherwise: bool = False) -> FeatureCode:
     """Compile the kernels of features, or load them from the cache.
 
     Args:

@@ -21,7 +21,7 @@ from uas_coverage_env.entities.state import (
     SwarmState,
     WorldState,
 )
-from uas_coverage_env.features.feature import Feature, memory_words
+from uas_coverage_env.features.feature import MissionFeature, memory_words
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import take_off
 from uas_coverage_env.simulation.flight import feature_code
@@ -57,7 +57,7 @@ _OUTCOMES_IN_BLOCK = 256
 
 
 def initial_state(
-    scenario: Scenario, arena: Arena | None = None, features: Sequence[Feature | None] = ()
+    scenario: Scenario, arena: Arena | None = None, features: Sequence[MissionFeature | None] = ()
 ) -> WorldState:
     """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off.
 
@@ -160,7 +160,7 @@ class World:
         return_mode: bool = False,
         safety_filter: bool = False,
         measured_m: float = math.inf,
-        disturbances: Sequence[Feature] | None = None,
+        disturbances: Sequence[MissionFeature] | None = None,
         judges_wrenches: bool = False,
         seed: int = 0,
     ) -> None:

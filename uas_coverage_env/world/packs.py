@@ -15,7 +15,7 @@ from uas_coverage_env.entities.state import (
     NEVER,
     SWAPPING,
 )
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.features.of_scenario import features_of
 from uas_coverage_env.geometry.segments import cylinder_clearance, outside_cylinder
 from uas_coverage_env.scenario import Scenario
@@ -251,13 +251,13 @@ def _swap_packs(arena, state, outcome, f):
                 _end(state, i, outcome)
 
 
-PACKS = Feature("packs", {Point.JUDGED: _swap_packs})
+PACKS = MissionFeature("packs", {Point.JUDGED: _swap_packs})
 """Swaps of each UAS on its own."""
 
 
 def mission_features(
-    scenario: Scenario, disturbances: Sequence[Feature] | None = None
-) -> tuple[Feature, ...]:
+    scenario: Scenario, disturbances: Sequence[MissionFeature] | None = None
+) -> tuple[MissionFeature, ...]:
     """What a mission has of what few missions have.
 
     Args:

@@ -9,8 +9,10 @@ from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
 from uas_coverage_agents.velocity.stuck_detection import StuckDetection
 from uas_coverage_env.env import OBSERVATION_SIZE, MissionInterface, observation_columns
-from uas_coverage_env.env.actions import ACTIONS, actions_of
-from uas_coverage_env.env.observation import OBSERVATION, SCALES
+from uas_coverage_env.env.actions import ACTIONS
+from uas_coverage_env.env.actions.given import actions_of
+from uas_coverage_env.env.observation import OBSERVATION
+from uas_coverage_env.env.observation.scales import SCALES
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.mission.approach import Approach

@@ -6,9 +6,9 @@ import textwrap
 from typing import Any, ClassVar
 
 from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, inside_name
-from uas_coverage_env.env.observation import layout_table
+from uas_coverage_env.env.observation.layout import layout_table
 from uas_coverage_env.env.report import InfoField
-from uas_coverage_env.env.rewards import rewards_table
+from uas_coverage_env.env.rewards.terms import rewards_table
 from uas_coverage_env.env.versions import V0, Version
 
 _SETTING = re.compile(r"^( +)action: (?:.*\n)+?\1 +.*as in the version\.\n", re.MULTILINE)

@@ -8,7 +8,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.env.observation import ObservationBlock, observation_bounds
+from uas_coverage_env.env.observation import ObservationBlock
+from uas_coverage_env.env.observation.layout import observation_bounds
 
 
 def observation_space(settings: MissionSettings, n_uas: int = 1) -> spaces.Space[Any]:

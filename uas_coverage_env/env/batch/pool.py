@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.views import lane_view, pool_view
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env.actions.given import actions_of
 from uas_coverage_env.env.batch.memory import DRAW, REST, MissionPool, SubEnvironments
 from uas_coverage_env.env.batch.slots import Slots
 from uas_coverage_env.env.batch.source import DrawnMission
@@ -23,7 +23,7 @@ from uas_coverage_env.env.episode.memory import (
 )
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.features.feature import Feature, fitted_to, in_slots
+from uas_coverage_env.features.feature import MissionFeature, fitted_to, in_slots
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.room import Room
 from uas_coverage_env.scenario.source import loaded_scenario
@@ -39,7 +39,7 @@ MEASURED_M = 0.0
 def scene_arrays(
     known: Scenario,
     settings: MissionSettings,
-    features: Sequence[Feature],
+    features: Sequence[MissionFeature],
     before: Tables,
 ) -> tuple[Arena, Tables]:
     """The arrays of a mission whose scene has changed.
@@ -99,7 +99,7 @@ class ScenarioPool:
         self,
         scenario: str | Path | Scenario | Sequence[str | Path | Scenario],
         settings: MissionSettings | None = None,
-        features: Sequence[Feature] | None = None,
+        features: Sequence[MissionFeature] | None = None,
         *,
         lanes: int = 0,
     ) -> None:

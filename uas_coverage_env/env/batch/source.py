@@ -6,11 +6,11 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.actions import Actions
+from uas_coverage_env.env.actions.given import Actions
 from uas_coverage_env.env.batch.memory import MissionPool, SubEnvironments
 from uas_coverage_env.env.episode.memory import Tables
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.features.feature import Feature
+from uas_coverage_env.features.feature import MissionFeature
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world.arena import Arena
 
@@ -42,7 +42,7 @@ class LaneMissions(Protocol):
     settings: MissionSettings
     actions: Actions
     sizes: dict[str, int]
-    features: tuple[Feature, ...]
+    features: tuple[MissionFeature, ...]
     goes_home: bool
     changes: bool
     draws: bool

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.env.actions import Actions
+from uas_coverage_env.env.actions.given import Actions
 from uas_coverage_env.env.episode.memory import (
     FIRST_OBSERVATION,
     LEARNERS,

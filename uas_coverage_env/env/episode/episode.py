@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.compiled.kernels import machine_code
-from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env.actions.given import actions_of
 from uas_coverage_env.env.episode.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.episode.arrays import arrays_of, report_start
 from uas_coverage_env.env.episode.express import Moment

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.guidance import velocity_of
 from uas_coverage_env.entities.commands import pack
 from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.env.actions import Actions
+from uas_coverage_env.env.actions.given import Actions
 from uas_coverage_env.env.episode.memory import Learners, Tables
 from uas_coverage_env.world import Arena, Command, GoTo, WorldState
 

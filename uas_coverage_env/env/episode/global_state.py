@@ -13,7 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.state import LANDED, LOST, SWAPPING
-from uas_coverage_env.env.observation import observation_bounds
+from uas_coverage_env.env.observation.layout import observation_bounds
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.scenario.room import Room
 

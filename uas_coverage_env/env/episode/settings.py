@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.observation import ObservationBlock
-from uas_coverage_env.env.rewards import RewardTerm, weights_of
+from uas_coverage_env.env.rewards import RewardTerm
+from uas_coverage_env.env.rewards.term import weights_of
 from uas_coverage_env.env.versions import V0, Version
-from uas_coverage_env.features.feature import Feature, checked_features
+from uas_coverage_env.features.feature import MissionFeature, checked_features
 from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world.packs import mission_features
@@ -43,7 +44,7 @@ class MissionKeywords(TypedDict, total=False):
     max_cycles: int | None
     observation: str | tuple[ObservationBlock, ...] | None
     reward: tuple[RewardTerm, ...] | None
-    disturbances: tuple[Feature, ...] | None
+    disturbances: tuple[MissionFeature, ...] | None
     mask_in_observation: bool
     images_apart: bool
     flat_infos: bool | None
@@ -96,7 +97,7 @@ class MissionSettings:
     max_steps: int | None = None
     observation: Any = None
     reward: Any = None
-    disturbances: tuple[Feature, ...] | None = None
+    disturbances: tuple[MissionFeature, ...] | None = None
     mask_in_observation: bool = False
     images_apart: bool = False
     flat_infos: bool | None = None
@@ -193,7 +194,7 @@ class MissionSettings:
         """Whether the action is a choice."""
         return self.kind.choices > 0
 
-    def features_in(self, scenario: Scenario) -> tuple[Feature, ...]:
+    def features_in(self, scenario: Scenario) -> tuple[MissionFeature, ...]:
         """What the missions of a scenario have of what few have."""
         return mission_features(scenario, self.disturbances)
 

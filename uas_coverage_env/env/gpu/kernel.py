@@ -35,7 +35,7 @@ from uas_coverage_env.env.episode.pay import Terms, compute_rewards_with
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.episode.step import ACCEPTED, look_around_with, pay_step_with
 from uas_coverage_env.env.report import REWARD, STATUS
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.simulation.flight import check_all, fly_still, move_all, write_all_inputs
 from uas_coverage_env.simulation.on_gpu import called_at, called_at_begin
 from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
@@ -88,7 +88,7 @@ def _is_due(state):
 
 
 @cache
-def _begin_with(features: tuple[Feature, ...]) -> Any:
+def _begin_with(features: tuple[MissionFeature, ...]) -> Any:
     """A function that begins the next mission of a lane."""
     begin_features = called_at_begin(features)
 
@@ -115,7 +115,7 @@ def _begin_with(features: tuple[Feature, ...]) -> Any:
 
 
 @cache
-def _flies_with(features: tuple[Feature, ...]) -> Any:
+def _flies_with(features: tuple[MissionFeature, ...]) -> Any:
     begin = _begin_with(features)
 
     @kernel
@@ -201,7 +201,9 @@ def _write_with(write: Any) -> Any:
 
 
 @cache  # to compile it again takes seconds
-def _fly_with(features: tuple[Feature, ...], nonlinear: bool, has_true_vehicles: bool) -> Any:
+def _fly_with(
+    features: tuple[MissionFeature, ...], nonlinear: bool, has_true_vehicles: bool
+) -> Any:
     """Fly and judge a step with what the features do."""
     command, act, moved, judged, sensed = (
         called_at(point, features) for point in Point if point != Point.BEGIN
@@ -250,7 +252,7 @@ def _step_of(write: Any, flies: Any, fly: Any, finish: Any) -> Any:
 
 
 def step_with(
-    settings: MissionSettings, features: tuple[Feature, ...], has_true_vehicles: bool
+    settings: MissionSettings, features: tuple[MissionFeature, ...], has_true_vehicles: bool
 ) -> Any:
     """The step of all lanes, to be launched.
 

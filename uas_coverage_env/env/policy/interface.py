@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.entities.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH, Mode
 from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env.actions.given import actions_of
 from uas_coverage_env.env.episode.act import (
     Kinds,
     acting_of,
