@@ -189,6 +189,27 @@ def test_the_planners_are_listed_with_their_options(capsys):
         assert words in out
 
 
+def test_planners_are_listed_for_machines(capsys):
+    assert main(["planner", "list", "--json"]) == 0
+    listed = {planner["name"]: planner for planner in json.loads(capsys.readouterr().out)}
+    assert {"hover", "milp-mpc", "trajectory"} <= listed.keys()
+    (climb,) = (one for one in listed["hover"]["options"] if one["name"] == "climb_m")
+    assert (climb["default"], climb["values"]) == ("5.0", "float")
+    assert main(["planner", "list", "tour", "--json"]) == 0
+    assert [one["name"] for one in json.loads(capsys.readouterr().out)] == ["tour"]
+
+
+def test_a_new_scenario_begins_as_one_that_there_is(elsewhere, capsys):
+    assert main(["scenario", "new", "town:7", "--out", "my town.toml"]) == 0
+    made = load_scenario(elsewhere / "my town.toml")
+    assert made == load_scenario("town:7").model_copy(update={"name": "my_town"})
+    assert main(["scenario", "new", "village", "--out", "my town.toml"]) == 2
+    assert "my town.toml: exists; give another --out or add --overwrite" in capsys.readouterr().err
+    assert main(["scenario", "new", "village", "--out", "my town.toml", "--overwrite"]) == 0
+    assert main(["scenario", "new", "village", "--out", "mine.json"]) == 2
+    assert "--out mine.json: should end in .toml" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", [[], ["run"], ["scenario"], ["scenario", "check"], ["planner"]])
 def test_every_command_has_help(command, capsys):
     assert main([*command, "--help"]) == 0

@@ -5,6 +5,7 @@ import io
 import json
 import os
 import signal
+import subprocess
 import sys
 from contextlib import contextmanager
 from functools import partial
@@ -154,6 +155,7 @@ def test_an_interruption_that_a_library_turns_into_an_error_is_one_line(monkeypa
 
 STOPPED = """
 import signal
+import subprocess
 
 from uas_coverage_env.flight import load_planner
 
@@ -179,3 +181,28 @@ def test_a_mission_that_is_stopped_by_hand_is_not_scored(elsewhere, monkeypatch,
     assert flights_in("kept") == []
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == "error: stopped by hand; what was finished before is kept"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_process_that_is_stopped_keeps_the_flight_and_tells_the_signal(elsewhere, name):
+    number = getattr(signal, name)
+    command = ["run", "open_field", "--planner", "hover", "--out", "mine"]
+    started = subprocess.Popen(
+        [sys.executable, "-m", "uas_coverage_env", *command],
+        # as a shell starts it, also where the tests run in the background or under nohup
+        preexec_fn=lambda: (
+            signal.signal(signal.SIGINT, signal.default_int_handler),
+            signal.signal(signal.SIGHUP, signal.SIG_DFL),
+        ),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert started.stdout is not None
+    assert started.stdout.readline().startswith("step 0/")
+    started.send_signal(number)
+    _, said = started.communicate()
+    assert started.returncode == 128 + number
+    assert said.splitlines()[-1] == "error: stopped by hand; what was finished before is kept"
+    assert Flight.load("mine").ended == "stopped"

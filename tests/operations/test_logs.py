@@ -20,6 +20,7 @@ from test_export import random_flight
 
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.cli import main
+from uas_coverage_env.cli.sorties import keep_planned, load_planned
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import covered_at, rest_of
 from uas_coverage_env.flight.metrics import accomplished
@@ -70,7 +71,8 @@ def test_an_exported_track_comes_back_as_the_flight_that_it_was(plan, plan_at, t
     arguments = ["--format", "csv", "--out", str(files), "--min-slack", "0", *HERE]
     assert main(["export", plan_at, *arguments]) == 0
     logs = [str(files / f"{name}.csv") for name in plan.names]
-    assert main(["log", *logs, "--plan", plan_at, "--out", str(out), *HERE]) == 0
+    # the export holds its flight, and where it is
+    assert main(["log", *logs, "--plan", str(files), "--out", str(out)]) == 0
     said = capsys.readouterr()
     assert "covered 100%" in said.out
     assert "estimated" not in said.out + said.err
@@ -92,6 +94,15 @@ def test_an_exported_track_comes_back_as_the_flight_that_it_was(plan, plan_at, t
     assert plan.min_separation_m - 0.1 < flight.min_separation_m < plan.min_separation_m + 0.5
     assert accomplished(flight)
     assert (out / "map.png").is_file()
+
+
+def test_the_log_of_one_of_several_sorties_needs_its_own_plan(plan, tmp_path):
+    keep_planned([plan, plan], tmp_path, None)
+    with pytest.raises(InputError, match=r"holds 2 sorties; give the one .* \S*planned_1$"):
+        load_planned(tmp_path)
+    assert load_planned(tmp_path / "planned_2") == plan
+    keep_planned([plan], tmp_path, None)
+    assert load_planned(tmp_path) == plan
 
 
 def test_charge_of_a_log_is_that_of_the_flight(plan):

@@ -246,7 +246,7 @@ def export(asked: AskedExport) -> None:
     if left:
         raise InputError(f"--out {out}: holds {min(left)} of another export; give another --out")
     write_files(out, {name: text.encode() for name, text in made.files.items()})
-    keep_planned(flights, out)
+    keep_planned(flights, out, options.place)
     _report_export(console(), made, out)
     warn(made.notes)
 

@@ -1,5 +1,6 @@
 """Sorties of `uas-coverage run`: a flight directory for each, and one summary."""
 
+import dataclasses
 import json
 import shutil
 import sys
@@ -17,6 +18,7 @@ from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.flight import Flight, sorties_summary
 from uas_coverage_env.interruptions import STOPPED
+from uas_coverage_env.scenario import Place
 
 SUMMARY = "sorties.json"
 _MOST_BYTES = 10_000_000
@@ -72,12 +74,21 @@ def load_flights(directory: Path) -> list[Flight]:
     return [Flight.load(directory / f"sortie_{number}") for number in range(1, count + 1)]
 
 
-def keep_planned(flights: Sequence[Flight], out: Path) -> None:
-    """Keep the flights whose files a directory holds beside these, for `log`."""
+def keep_planned(flights: Sequence[Flight], out: Path, place: Place | None) -> None:
+    """Keep the flights whose files a directory holds beside these, for `log`.
+
+    Args:
+        flights: Of the export.
+        out: Its directory.
+        place: Of the origin, where the scenario does not say.
+    """
     for path in out.glob(f"{_PLANNED}*"):
         if path.is_dir():
             shutil.rmtree(path)
     for number, flight in enumerate(flights, start=1):
+        if place is not None:
+            there = flight.scenario.model_copy(update={"place": place})
+            flight = dataclasses.replace(flight, scenario=there)
         flight.save(out / (_PLANNED if len(flights) == 1 else f"{_PLANNED}_{number}"))
 
 
