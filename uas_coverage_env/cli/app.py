@@ -4,13 +4,13 @@ import io
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Annotated
 
 import typer
 
-from uas_coverage_env.cli.lazy import HELP, MARKUP, CommandEntry, LazyGroup, at
+from uas_coverage_env.cli.lazy import HELP, MARKUP, CommandEntry, GroupOfCommands, LazyGroup, at
 from uas_coverage_env.cli.output import DONE, REFUSED, one_line
 from uas_coverage_env.cli.plugins import plugin_entries
 from uas_coverage_env.cli.retired import follower
@@ -28,110 +28,45 @@ _FEW = 6
 """Commands of a group that a message names; of more, the help."""
 
 
-def _ours(name: str, location: str, summary: str) -> CommandEntry:
-    return CommandEntry(name, summary, at(f"uas_coverage_env.cli.{location}"))
-
-
-COMMANDS = (
-    _ours(
-        "demo",
-        "demo:demo",
-        "Show a recorded flight, fly a first one, and open the page of each in a browser.",
-    ),
-    _ours("run", "run:run", "Fly one mission and write a flight directory."),
-    _ours(
-        "compare",
-        "compare:compare",
-        "Fly every planner on every scenario with every seed, and compare them.",
-    ),
-    _ours(
-        "score",
-        "score:score_command",
-        "Fly the missions of a level and print the scores (docs/levels.md).",
-    ),
-    _ours("show", "show:show", "Show the figures of a flight, or of two side by side."),
-    _ours(
-        "replay",
-        "replay:replay",
-        "Write DIR/replay.html, a page that opens from disk and needs no network.",
-    ),
-    _ours("figure", "figure:figure", "Draw a figure as a vector file (needs the extra `view`)."),
-    CommandEntry(
-        "scenario",
+COMMANDS: Mapping[str, CommandEntry] = {
+    "demo": at("demo:demo"),
+    "run": at("run:run"),
+    "compare": at("compare:compare"),
+    "score": at("score:score_command"),
+    "show": at("show:show"),
+    "replay": at("replay:replay"),
+    "figure": at("figure:figure"),
+    "scenario": GroupOfCommands(
         "List scenarios, check one, make one, or go on with a mission that was broken off.",
-        commands=(
-            _ours(
-                "list",
-                "scenario:list_scenarios",
-                "List the shipped scenarios, the families that draw others, and the levels.",
-            ),
-            _ours("check", "scenario:check", "Validate, summarise and draw a scenario."),
-            _ours("new", "scenario:new", "Write a scenario to a file, to begin one's own with."),
-            _ours(
-                "resume", "resume:resume", "Write the scenario of what a flight has left to cover."
-            ),
-        ),
+        {
+            "list": at("scenario:list_scenarios"),
+            "check": at("scenario:check"),
+            "new": at("scenario:new"),
+            "resume": at("resume:resume"),
+        },
     ),
-    CommandEntry(
-        "vehicle",
+    "vehicle": GroupOfCommands(
         "List the shipped vehicles, check one, or make one.",
-        commands=(
-            _ours("list", "vehicle:list_vehicles", "List the shipped vehicles."),
-            _ours(
-                "check",
-                "vehicle:check",
-                "Validate a vehicle and print the quantities derived from its parts.",
-            ),
-            _ours(
-                "new",
-                "vehicle:new",
-                "Make a vehicle file from data-sheet figures and print the assumptions.",
-            ),
-        ),
+        {
+            "list": at("vehicle:list_vehicles"),
+            "check": at("vehicle:check"),
+            "new": at("vehicle:new"),
+        },
     ),
-    CommandEntry(
-        "planner",
+    "planner": GroupOfCommands(
         "List planners and their options, compile for them, or keep what they do.",
-        commands=(
-            _ours(
-                "list",
-                "planner:list_planners",
-                "List the planners and their options (set them with `run --option key=value`).",
-            ),
-            _ours(
-                "warm-up",
-                "warm_up:warm_up",
-                "Compile the simulation for this machine, so that the first flight begins at once.",
-            ),
-            _ours(
-                "demonstrate",
-                "demonstrate:demonstrate_command",
-                "Fly missions and keep observations and what was done, for imitation.",
-            ),
-        ),
+        {
+            "list": at("planner:list_planners"),
+            "warm-up": at("warm_up:warm_up"),
+            "demonstrate": at("demonstrate:demonstrate_command"),
+        },
     ),
-    _ours(
-        "import",
-        "operations:import_area",
-        "Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`).",
-    ),
-    _ours(
-        "export",
-        "operations:export",
-        "Write a file for each sortie, few straight checked legs, and a report (extra `ops`).",
-    ),
-    _ours(
-        "stream",
-        "stream:stream",
-        "Fly a plan in time on ArduPilot or PX4, by MAVLink position targets (extra `ops`).",
-    ),
-    _ours(
-        "log",
-        "logs:log",
-        "Make a flight directory from logs of UAS that flew, judged by the rules (extra `ops`).",
-    ),
-)
-"""The commands of the package; each says in its first line what stands here."""
+    "import": at("operations:import_area"),
+    "export": at("operations:export"),
+    "stream": at("stream:stream"),
+    "log": at("logs:log"),
+}
+"""The commands of the package; with those that are installed beside it, they are sixteen."""
 
 app = typer.Typer(
     cls=LazyGroup,
@@ -165,7 +100,7 @@ def command_group() -> LazyGroup:
     """The command line with the commands of the package and those of others."""
     group = typer.main.get_command(app)
     assert isinstance(group, LazyGroup)
-    group.add_entries([*COMMANDS, *plugin_entries()])
+    group.add_entries({**COMMANDS, **plugin_entries()})
     return group
 
 
