@@ -42,7 +42,7 @@ COMMANDS: Mapping[str, CommandEntry] = {
             "list": at("scenario:list_scenarios"),
             "check": at("scenario:check"),
             "new": at("scenario:new"),
-            "resume": at("resume:resume"),
+            "resume": at("scenario:resume"),
         },
     ),
     "vehicle": GroupOfCommands(

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from uas_coverage_env.cli.output import console
+from uas_coverage_env.cli.options import ReplaceFileOption
+from uas_coverage_env.cli.output import console, extra
 from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
@@ -58,9 +59,7 @@ def figure(
     out: Annotated[
         Path | None, typer.Option(help="A .pdf, .svg or .png; default: DIR/KIND.pdf.")
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the file that --out names.")
-    ] = False,
+    overwrite: ReplaceFileOption = False,
 ) -> None:
     """Draw a figure as a vector file (needs the extra `view`).
 
@@ -76,16 +75,10 @@ def figure(
         raise InputError(f"--step is for --kind map; a figure of kind {kind} shows all steps")
     if len(directories) > 1 and kind != _TRAINING:
         raise InputError(f"--kind {kind} shows one directory; {len(directories)} were given")
-    try:
+    with extra("view", "a figure needs", ["matplotlib"]):
         from uas_coverage_env.replay.figures import save_figure
         from uas_coverage_env.replay.figures.style import WIDTH_IN, look
         from uas_coverage_env.replay.figures.training import CURVE
-    except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] != "matplotlib":
-            raise
-        raise InputError(
-            'a figure needs matplotlib: pip install "uas-coverage-env[view]"'
-        ) from error
     for directory in directories:
         _check_sort(directory, kind, CURVE)
     width_in = WIDTH_IN if width is None else width / _MM_PER_IN

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from uas_coverage_env.cli.flights import keep_flight, report_flight
-from uas_coverage_env.cli.operations import asked_place, extra
+from uas_coverage_env.cli.operations import asked_place, ops
 from uas_coverage_env.cli.options import PlaceOption, ReplaceFlightOption
 from uas_coverage_env.cli.output import console, warn
 from uas_coverage_env.cli.sorties import load_planned
@@ -54,7 +54,7 @@ def log(
     overwrite: ReplaceFlightOption = False,
 ) -> None:
     """Make a flight directory from logs of UAS that flew, judged by the rules (extra `ops`)."""
-    with extra():
+    with ops():
         from uas_coverage_env.operations import LocalFrame, flown_flight
         from uas_coverage_env.operations.export import place_of_flight
     check_directory(out, overwrite=overwrite)
@@ -63,7 +63,7 @@ def log(
     there = place_of_flight(planned, asked_place(place))
     numbers = _chosen("--flight", flight, planned.names)
     batteries = _chosen("--battery", battery, planned.names)
-    with extra():
+    with ops():
         found = _by_uas(logs, planned.names, batteries)
         made = flown_flight(planned, found, LocalFrame(there), numbers)
     keep_flight(made.flight, out, overwrite=overwrite)

@@ -1,7 +1,6 @@
 """`uas-coverage import` and `export`: from a drawn area to a mission, from a flight to files."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,7 +17,7 @@ from uas_coverage_env.cli.options import (
     scenario_name,
     taken,
 )
-from uas_coverage_env.cli.output import console, warn
+from uas_coverage_env.cli.output import console, extra, warn
 from uas_coverage_env.cli.sorties import keep_planned, load_flights
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
@@ -31,18 +30,9 @@ if TYPE_CHECKING:
 _LIBRARIES = {"pyproj", "shapely", "shapefile", "defusedxml", "pymavlink", "rasterio", "osmium"}
 
 
-@contextmanager
-def extra() -> Iterator[None]:
-    """Say which extra is missing, where it is."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        name = (error.name or "").partition(".")[0]
-        if name not in _LIBRARIES:
-            raise
-        raise InputError(
-            f'places on the Earth and logs need {name}: pip install "uas-coverage-env[ops]"'
-        ) from error
+def ops() -> AbstractContextManager[None]:
+    """Say that the extra is missing, where it is."""
+    return extra("ops", "places on the Earth and logs need", _LIBRARIES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +149,7 @@ class AskedImport:
 @declared
 def import_area(asked: AskedImport) -> None:
     """Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`)."""
-    with extra():
+    with ops():
         from uas_coverage_env.operations import make_scenario, read_drawings
     check_new_toml(asked.out, overwrite=asked.overwrite)
     if asked.resolution_cm is not None and asked.height_m is not None:
@@ -234,7 +224,7 @@ class AskedExport:
 @declared
 def export(asked: AskedExport) -> None:
     """Write a file for each sortie, few straight checked legs, and a report (extra `ops`)."""
-    with extra():
+    with ops():
         from uas_coverage_env.operations import ENDINGS, ExportOptions, make_export
     out = asked.out
     if out.is_dir() and any(out.iterdir()) and not asked.overwrite:

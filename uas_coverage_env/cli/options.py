@@ -1,4 +1,7 @@
-"""Options that several commands have, and commands whose options are the fields of a record."""
+"""Options that several commands have, and commands whose options are the fields of a record.
+
+It is imported to list commands: what is heavy is imported when it is asked for.
+"""
 
 import inspect
 import re
@@ -9,7 +12,6 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from uas_coverage_env.cli import completion
 from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.runner import Backend
@@ -36,20 +38,38 @@ BackendOption = Annotated[
     ),
 ]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Delete the flights in --out.")]
+
+
+def scenarios_like(incomplete: str) -> list[str]:
+    """Scenarios by name; of those that are generated, all but the seed."""
+    from uas_coverage_env.scenario import scenario_names
+    from uas_coverage_env.scenario.families import installed_families
+
+    known = (*scenario_names(), *(f"{family}:" for family in installed_families()))
+    return [name for name in known if name.startswith(incomplete)]
+
+
+def planners_like(incomplete: str) -> list[str]:
+    """Planners by name."""
+    from uas_coverage_env.flight import planner_names
+
+    return [name for name in planner_names() if name.startswith(incomplete)]
+
+
 ScenarioArgument = Annotated[
     str,
     typer.Argument(
         metavar="SCENARIO",
         help="Name of a shipped scenario (see `scenario list`), `generated:SEED` or another that "
         "`compare` takes, or a scenario file.",
-        autocompletion=completion.scenarios,
+        autocompletion=scenarios_like,
     ),
 ]
 PlannerOption = Annotated[
     str,
     typer.Option(
         help="Name (see `planner list`), `policy:DIR`, or MODULE:CLASS of your own.",
-        autocompletion=completion.planners,
+        autocompletion=planners_like,
     ),
 ]
 PlannerOptions = Annotated[
@@ -61,6 +81,7 @@ DynamicsOption = Annotated[
     DynamicsName, typer.Option(help="The paper's linear model, or 6-DOF with exact power.")
 ]
 FilterOption = Annotated[bool, typer.Option("--filter", help="Switch the safety filter on.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, for machines.")]
 FlightDirectory = Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")]
 SecondFlight = Annotated[
     Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")

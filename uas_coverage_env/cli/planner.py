@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from uas_coverage_env.cli import completion
+from uas_coverage_env.cli.options import JsonOption, planners_like
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.flight import describe_planners
 from uas_coverage_env.flight.registry import PlannerDescription, describe_planner
@@ -21,10 +21,10 @@ def list_planners(
         typer.Argument(
             metavar="NAME",
             help="Describe this one alone, and at length.",
-            autocompletion=completion.planners,
+            autocompletion=planners_like,
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """List the planners and their options (set them with `run --option key=value`)."""
     out = console()

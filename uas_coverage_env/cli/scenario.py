@@ -1,7 +1,6 @@
 """`uas-coverage scenario`: the missions that are shipped, a check of one's own, and a new one."""
 
 import math
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -12,19 +11,21 @@ from PIL import Image, UnidentifiedImageError
 from PIL.PngImagePlugin import PngInfo
 from rich.table import Table
 
-from uas_coverage_env.cli import completion
 from uas_coverage_env.cli.options import (
     ReplaceFileOption,
     ScenarioArgument,
     check_new_toml,
     scenario_name,
 )
-from uas_coverage_env.cli.output import console, loaded
+from uas_coverage_env.cli.output import console, loaded, warn
 from uas_coverage_env.draw import picture
 from uas_coverage_env.draw.signs import legend
-from uas_coverage_env.files.plain_files import written_by
+from uas_coverage_env.files.plain_files import write_atomically, written_by
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.left_open import too_long
+from uas_coverage_env.flight.record import LANDED, LOST
+from uas_coverage_env.flight.rest import rest_of
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.access import Access
 from uas_coverage_env.mission.errands import Errands
@@ -64,14 +65,7 @@ def list_scenarios() -> None:
 
 
 def check(
-    file: Annotated[
-        str,
-        typer.Argument(
-            metavar="FILE",
-            help="Scenario file, or the name of a shipped or generated one.",
-            autocompletion=completion.scenarios,
-        ),
-    ],
+    scenario: ScenarioArgument,
     picture_file: Annotated[
         Path | None, typer.Option("--picture", help="PNG to draw; default: NAME.png, here.")
     ] = None,
@@ -84,17 +78,16 @@ def check(
 
     A picture that this command has made is drawn anew.
     """
-    scenario = loaded(file)
-    access = Access(MissionBrief.of(scenario))
-    for warning in _closed_off(scenario, access):
-        sys.stderr.write(f"warning: {warning}\n")
-    path = picture_file or Path(f"{scenario.name}.png")
+    mission = loaded(scenario)
+    access = Access(MissionBrief.of(mission))
+    warn(_closed_off(mission, access))
+    path = picture_file or Path(f"{mission.name}.png")
     if path.exists() and not overwrite and not _drawn_by_us(path):
         raise InputError(f"{path}: exists; give another --picture or add --overwrite")
     pixels = np.vstack(
         [
-            picture(scenario, World(scenario).swarm_state(), size_px=_PICTURE_PX),
-            legend(scenario, _signs(scenario), _PICTURE_PX),
+            picture(mission, World(mission).swarm_state(), size_px=_PICTURE_PX),
+            legend(mission, _signs(mission), _PICTURE_PX),
         ]
     )
     try:
@@ -105,10 +98,10 @@ def check(
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     out = console()
-    out.print(f"[bold]{scenario.name}[/] is valid", highlight=False)
-    for line in _lines(scenario):
+    out.print(f"[bold]{mission.name}[/] is valid", highlight=False)
+    for line in _lines(mission):
         out.print(line, markup=False)
-    for line in _far(scenario, access):
+    for line in _far(mission, access):
         out.print(f"charge     {line}", markup=False)
     out.print(f"drawn in {path}", markup=False)
 
@@ -128,6 +121,39 @@ def new(
     mission.to_file(out)
     said = f"scenario in {out}; to draw it: uas-coverage scenario check {out}"
     console().print(said, markup=False)
+
+
+def resume(
+    directory: Annotated[
+        Path,
+        typer.Argument(metavar="DIR", help="Flight directory, of `run` or of `log`."),
+    ],
+    out: Annotated[Path, typer.Option(help="Scenario file to write.")],
+    from_here: Annotated[
+        bool,
+        typer.Option(
+            "--from-here",
+            help="UAS go on from where they were, with the charge that they had; default: all "
+            "start at home with fresh packs.",
+        ),
+    ] = False,
+    overwrite: ReplaceFileOption = False,
+) -> None:
+    """Write the scenario of what a flight has left to cover."""
+    check_new_toml(out, overwrite=overwrite)
+    flight = Flight.load(directory)
+    rest = rest_of(flight, from_here=from_here)
+    write_atomically(out, rest.file_text().encode())
+    screen = console()
+    modes = flight.mode[-1]
+    for i, name in enumerate(flight.names):
+        if modes[i] == LOST:
+            screen.print(f"{name} was lost and is left out", markup=False)
+        elif from_here and modes[i] != LANDED:
+            screen.print(f"{name} goes on with {flight.soc[-1, i]:.1%} of charge", markup=False)
+    left = len(rest.waypoints)
+    asked = left + int(flight.covered[-1])
+    screen.print(f"{left} of {asked} waypoints are left; scenario in {out}", markup=False)
 
 
 def _closed_off(scenario: Scenario, access: Access) -> Iterator[str]:
