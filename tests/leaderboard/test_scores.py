@@ -269,14 +269,14 @@ def test_a_note_names_the_planners_that_fly_alike_with_every_seed():
         (Figure("spare_Wh", float, len, "", over="most", digits=0), 3.0, "3"),
         (Figure("spare_Wh", float, len, "", over="least"), 1.0, "1.00"),
         (Figure("wait_s", float, len, "", over="average", unit="ms"), 2000.0, "2000"),
-        (Figure("spares", int, len, "", over="total"), 4, "4"),
-        (Figure("spares", int, len, "", over="median"), 2.0, "2.0"),
+        (Figure("spare_uas", int, len, "", over="total"), 4, "4"),
+        (Figure("spare_uas", int, len, "", over="median"), 2.0, "2.0"),
         (Figure("spare", bool, len, ""), 4, "4/2"),
     ],
 )
 def test_a_figure_is_summed_up_over_flights_as_it_says(figure, value, cell):
     class Flown:
-        status, spares = FLOWN, 0
+        status = FLOWN
 
         def __init__(self, found):
             self.found = found

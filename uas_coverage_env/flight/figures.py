@@ -215,6 +215,11 @@ def computed(flight: FlightRecord) -> tuple[dict[str, Any], dict[str, str]]:
     return values, failed
 
 
+def repeated() -> list[str]:
+    """The names of those in rows that a repeatable flight repeats."""
+    return [name for name, figure in figures().items() if figure.in_rows and figure.repeats]
+
+
 def row_figures(flight: FlightRecord | None) -> dict[str, bool | int | float | None]:
     """What rows hold of a flight; None: of one that failed."""
     return rows_part(None if flight is None else computed(flight)[0])
