@@ -30,10 +30,11 @@ from uas_coverage_env.env.settings import MissionSettings
 from uas_coverage_env.flight import Planner, as_planner
 from uas_coverage_env.flight.figures import ByName, repeated
 from uas_coverage_env.flight.policy import Policy, PolicyFunction
-from uas_coverage_env.leaderboard import Entry, PlannerSpec, Row
+from uas_coverage_env.leaderboard import PlannerSpec, Row
 from uas_coverage_env.leaderboard.flying import flown
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.leaderboard.statistics import Estimate, estimate
+from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.tasks.levels import level_named
