@@ -10,11 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.drawing import DrawnPolygon, LeftOut, TakeOff, drawn_of
-from uas_coverage_env.operations.features import Feature, attributes_of
-from uas_coverage_env.operations.lengths import length_m
-from uas_coverage_env.operations.roles import ROLES, UNSAID
-from uas_coverage_env.operations.tags import (
+from uas_coverage_env.operations.area_import.drawn_areas import (
+    DrawnPolygon,
+    LeftOut,
+    TakeOff,
+    drawn_of,
+)
+from uas_coverage_env.operations.area_import.feature_roles import ROLES, UNSAID
+from uas_coverage_env.operations.area_import.geo_features import Feature, attributes_of
+from uas_coverage_env.operations.area_import.length_texts import length_m
+from uas_coverage_env.operations.area_import.osm_tags import (
     LEAST_M,
     MET_TALL,
     STANDING,

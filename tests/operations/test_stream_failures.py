@@ -20,7 +20,7 @@ pytest.importorskip("pyproj")
 
 from stream_support import Loopback, apart_m, is_home, off_m, plan_of_two
 
-from uas_coverage_env.operations.stream.around import Around
+from uas_coverage_env.operations.stream.surroundings import Around
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,10 @@ from small_worlds import box, meadow
 
 pytest.importorskip("pyproj")
 
-from uas_coverage_env.operations.stream.around import Around, stopping_place_m
-from uas_coverage_env.operations.stream.limits import Limits
-from uas_coverage_env.operations.stream.pace import SHARE, STEP_S, Pace
+from uas_coverage_env.operations.stream.surroundings import Around, stopping_place_m
+from uas_coverage_env.operations.stream.time_scaling import SHARE, STEP_S, Pace
 from uas_coverage_env.operations.stream.timeline import Timeline
+from uas_coverage_env.operations.stream.vehicle_limits import Limits
 
 WALL = box("wall", (0.0, 100.0, -45.0), (199.0, 104.0, 0.0))
 LIMITS = Limits()

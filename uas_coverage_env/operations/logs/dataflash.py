@@ -15,8 +15,7 @@ from typing import Any
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.operations.logs.logged import Logged
-from uas_coverage_env.operations.logs.mavlink import opened
-from uas_coverage_env.operations.logs.streams import (
+from uas_coverage_env.operations.logs.messages import (
     UNKNOWN,
     Armed,
     Attitude,
@@ -31,6 +30,7 @@ from uas_coverage_env.operations.logs.streams import (
     Text,
     facts_of_text,
 )
+from uas_coverage_env.operations.logs.telemetry import opened
 
 MOST_BYTES = 500_000_000
 _FMT, _FMT_BYTES, _HEAD = 0x80, 89, b"\xa3\x95"

@@ -17,7 +17,7 @@ import numpy as np
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.operations.logs.logged import Logged
-from uas_coverage_env.operations.logs.streams import (
+from uas_coverage_env.operations.logs.messages import (
     UNKNOWN,
     Armed,
     Attitude,

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.operations.stream.around import Around
 from uas_coverage_env.operations.stream.link import VehicleLink
+from uas_coverage_env.operations.stream.surroundings import Around
 from uas_coverage_env.operations.stream.timeline import Timeline
 
 FloatArray = NDArray[np.float64]

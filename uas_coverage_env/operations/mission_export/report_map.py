@@ -1,0 +1,171 @@
+"""The map of an export's report: the mission from above, as SVG."""
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import shapely
+
+from uas_coverage_env.draw.labels import short_name
+from uas_coverage_env.draw.terrain import scale_step_m
+from uas_coverage_env.flight.seen import SEARCH_AREA
+from uas_coverage_env.operations.convex import hull_of
+from uas_coverage_env.operations.mission_export.formats.geofence import ZONES
+from uas_coverage_env.operations.mission_export.scheduling import Part
+from uas_coverage_env.scenario import Decoration, Obstacle
+
+# custom properties of the page's style, so that it can be light or dark
+_INK, _AREA, _FENCE, _WAYPOINT = "var(--ink)", "var(--area)", "var(--fence)", "var(--waypoint)"
+_OBSTACLE, _NO_FLY, _BAD = "var(--obstacle)", "var(--no-fly)", "var(--bad)"
+_SEARCH, _STREET = "var(--search)", "var(--street)"
+_OF_UAS_LIGHT = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
+_OF_UAS_DARK = ("#4d9cc9", "#e28e4d", "#c481ae", "#4dbb9d", "#eebc4d", "#89cbf0", "#b2b3b4")
+_FILLS = {
+    _SEARCH: "area to search",
+    _STREET: "street",
+    _OBSTACLE: "obstacle",
+    _NO_FLY: "no-fly zone",
+}
+
+
+def _of_uas(colours: Sequence[str]) -> str:
+    return "".join(f"--uas-{n}:{colour};" for n, colour in enumerate(colours))
+
+
+LIGHT = f"""--area:#fff;--fence:#888;--obstacle:#bbb8b0;--no-fly:#d9a29c;--search:#f3eedd;
+--street:#e3e3e0;--waypoint:#70be86;{_of_uas(_OF_UAS_LIGHT)}"""
+DARK = f"""--area:#262b2b;--fence:#c9ccc8;--obstacle:#5d5f5f;--no-fly:#7d4440;--search:#353224;
+--street:#343a3b;--waypoint:#70be86;{_of_uas(_OF_UAS_DARK)}"""
+"""Colours of the map, on light and on dark pages; `--ink` and `--bad` are the page's."""
+
+
+def map_of(parts: Sequence[Part]) -> str:
+    """The mission from above, north up: x is east, y is minus north.
+
+    Args:
+        parts: The flights of the mission, with their files.
+    """
+    scenario = parts[0].flight.scenario
+    corners_m = scenario.fence.vertices_m[:, :2]
+    low, high = corners_m.min(axis=0), corners_m.max(axis=0)
+    span_m = float((high - low).max())
+    pen = span_m / 400.0
+    shapes = [_outline(scenario.fence.vertices_m, _drawn(pen, _FENCE, fill=_AREA))]
+    shapes += [
+        _polygon([(-x, y) for x, y in item.polygon_m], _filled(fill), item.name)
+        for item in scenario.decorations
+        if (fill := _fill_of(item))
+    ]
+    shapes += [
+        _outline(hull.vertices_m, _filled(_fill_of(obstacle)), obstacle.name)
+        for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True)
+    ]
+    shapes += [
+        f'<circle cx="{w.position_m[1]:.1f}" cy="{-w.position_m[0]:.1f}" r="{w.radius_m:g}" '
+        f"{_drawn(pen / 2, _WAYPOINT)}/>"
+        for w in scenario.waypoints
+    ]
+    homes: dict[str, tuple[float, float]] = {}
+    names = parts[0].flight.names
+    files = [(n, one) for n, name in enumerate(names) for part in parts for one in part.of(name)]
+    for n, one in files:
+        colour = _colour(n)
+        line = " ".join(f"{y:.1f},{-x:.1f}" for x, y, _ in one.track.corners_m)
+        shapes.append(
+            f'<polyline points="{line}" {_drawn(1.5 * pen, colour)}>'
+            f"<title>{escape(one.track.name)}</title></polyline>"
+        )
+        x, y, _ = one.track.home_m
+        shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" {_filled(colour)}/>')
+        homes[names[n]] = (y, -x)
+        if one.track.lands_elsewhere:
+            x, y, _ = one.track.landing_m
+            shapes.append(
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" {_drawn(2 * pen, colour)}>'
+                f"<title>{escape(one.track.name)}: landing</title></circle>"
+            )
+        lost = one.still.point_of_no_return
+        if lost is None and one.in_wind is not None:
+            lost = one.in_wind.point_of_no_return
+        if lost is not None:
+            x, y, _ = one.track.legs[lost].end_m
+            shapes.append(
+                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{6 * pen}" {_drawn(2 * pen, _BAD)}>'
+                f"<title>{escape(one.track.name)}: point of no return</title></circle>"
+            )
+    around = 0.02 * span_m
+    for name, (x, y) in homes.items():
+        shapes.append(_words(short_name(name), x, y - 6 * pen, pen, anchor="middle"))
+    shapes.append(_scale(low[1], -low[0], span_m, pen))
+    height, width = high - low + 2.0 * around
+    box = f"{low[1] - around:.1f} {-high[0] - around:.1f} {width:.1f} {height:.1f}"
+    told = escape(f"Map, north up: fence, obstacles, waypoints, legs of {', '.join(homes)}")
+    return f'<svg viewBox="{box}" role="img" aria-label="{told}">{"".join(shapes)}</svg>'
+
+
+def _words(text: str, x: float, y: float, pen: float, anchor: str = "start") -> str:
+    size = f'font-size="{11 * pen:.1f}" stroke-width="{3 * pen:.1f}" text-anchor="{anchor}"'
+    return f'<text x="{x:.1f}" y="{y:.1f}" {size}>{escape(text)}</text>'
+
+
+def _scale(west: float, south: float, span_m: float, pen: float) -> str:
+    """A bar of a round length at the south-west, and where north is."""
+    long_m = scale_step_m(span_m)
+    bar = f"M{west + 4 * pen:.1f} {south - 4 * pen:.1f}h{long_m:g}"
+    words = _words(f"{long_m:g} m, N \N{UPWARDS ARROW}", west + 4 * pen, south - 8 * pen, pen)
+    return f'<path d="{bar}" {_drawn(2 * pen, _INK)}/>{words}'
+
+
+def key_of(parts: Sequence[Part]) -> str:
+    """What is what on the map.
+
+    Args:
+        parts: The flights of the mission, with their files.
+    """
+    flight = parts[0].flight
+    entries = [
+        (_colour(n), "50%", name)
+        for n, name in enumerate(flight.names)
+        if any(part.of(name) for part in parts)
+    ]
+    drawn = (*flight.scenario.decorations, *flight.scenario.obstacles)
+    fills = set(map(_fill_of, drawn))
+    entries += [(fill, "0", name) for fill, name in _FILLS.items() if fill in fills]
+    marks = "".join(
+        f'<span><i style="background:{colour};border-radius:{corner}"></i>{escape(name)}</span>'
+        for colour, corner, name in entries
+    )
+    return f'<p class="key">{marks}<span>green circles: waypoints</span></p>'
+
+
+def _drawn(width_m: float, colour: str, fill: str = "none") -> str:
+    """How a shape is drawn."""
+    return f'style="fill:{fill};stroke:{colour}" stroke-width="{width_m:g}"'
+
+
+def _filled(colour: str) -> str:
+    return f'style="fill:{colour}"'
+
+
+def _colour(n: int) -> str:
+    """That of the n-th UAS."""
+    return f"var(--uas-{n % len(_OF_UAS_LIGHT)})"
+
+
+def _fill_of(drawn: Decoration | Obstacle) -> str:
+    """The colour of something on the map; none where it is not shown."""
+    kind = drawn.kind or ""
+    if isinstance(drawn, Obstacle):
+        return _NO_FLY if kind in ZONES else _OBSTACLE
+    return _SEARCH if kind.startswith(SEARCH_AREA) else _STREET if kind == "street" else ""
+
+
+def _outline(vertices_m: Any, style: str, name: str = "") -> str:
+    ring = hull_of(shapely.MultiPoint(vertices_m[:, :2])).exterior.coords[:-1]
+    return _polygon([(-north, east) for north, east in ring], style, name)
+
+
+def _polygon(corners: Sequence[tuple[float, float]], style: str, name: str) -> str:
+    """A polygon of (south, east) corners."""
+    points = " ".join(f"{east:.1f},{south:.1f}" for south, east in corners)
+    return f'<polygon points="{points}" {style}><title>{escape(name)}</title></polygon>'
