@@ -282,7 +282,7 @@ def test_recorded_flights_of_an_autopilot_come_home_and_are_judged(tmp_path, cap
 HEAD = "t_s,latitude_deg,longitude_deg,height_m"
 MISTAKES = {
     "no file": (None, "cannot be read or written (no such file"),
-    "nothing": ("", "has no column t_s"),
+    "nothing": ("", "is empty"),
     "no column": ("t_s,lat,lon\n0,1,2", "has no column latitude_deg"),
     "no rows": (HEAD, "holds no sample"),
     "no number": (f"{HEAD}\n0,47,x,1", "line 2: longitude_deg 'x' is no number"),

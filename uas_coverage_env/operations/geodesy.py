@@ -50,6 +50,10 @@ class LocalFrame:
         middle_m = 0.5 * (places_m.min(axis=0) + places_m.max(axis=0))
         return cls._at(*first.to_geodetic(middle_m)[:2])
 
+    def at_height(self, height_m: float) -> "LocalFrame":
+        """The same frame, with its ground so high above mean sea level [m]."""
+        return LocalFrame(self.place.model_copy(update={"height_m": height_m}))
+
     @classmethod
     def _at(cls, latitude_deg: float, longitude_deg: float) -> "LocalFrame":
         place = Place(

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, RootModel
 
-from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.errors import InputError, check_within
 from uas_coverage_env.files.strict_toml import StrictModel, read_toml
 from uas_coverage_env.files.suggestions import did_you_mean
 
@@ -57,8 +57,7 @@ class Camera(StrictModel):
         Raises:
             InputError: There is no such height.
         """
-        if not 0.01 <= resolution_cm <= 1_000.0:
-            raise InputError(f"--resolution {resolution_cm:g}: should be between 0.01 and 1000 cm")
+        check_within("--resolution", resolution_cm, 0.01, 1_000.0)
         highest_m = 0.01 * resolution_cm / self.ground_sample_m(1.0)
         height_m = math.floor(10.0 * (highest_m - radius_m)) / 10.0
         if height_m <= radius_m:

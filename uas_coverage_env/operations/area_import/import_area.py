@@ -1,7 +1,7 @@
 """A scenario from what was drawn: fence, obstacles, waypoints and fleet in local metres."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 
 from uas_coverage_env.draw.signs import in_words
-from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.errors import InputError, check_within
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight.seen import SEARCH_AREA
@@ -37,11 +37,11 @@ from uas_coverage_env.operations.area_import.site import (
     Site,
     Wall,
     make_site,
-    no_fly_walls,
     town_walls,
+    zone_walls,
 )
 from uas_coverage_env.operations.area_import.town_map import Town, read_town
-from uas_coverage_env.operations.area_import.waypoints import Asked, make_waypoints
+from uas_coverage_env.operations.area_import.waypoints import Asked, Waypoints, make_waypoints
 from uas_coverage_env.operations.convex import polygons_of, without_holes
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.feasibility import back_and_forth
@@ -130,88 +130,124 @@ def make_scenario(things: Sequence[Drawn], name: str, options: ImportOptions) ->
         InputError: Something in it cannot be flown.
     """
     _check(options)
+    mission = _mission(things, options)
+    scenario = _finite(parse({"name": name, **mission.tables()}, Scenario, name))
+    town = mission.town
+    credit = town.credit if town.standing or town.streets or town.no_fly else ""
+    return Imported(scenario, tuple(mission.notes(things, scenario)), credit)
+
+
+@dataclass(frozen=True, eq=False)
+class _Mission:
+    """All that a scenario is made of; attributes as the functions that make them say."""
+
+    options: ImportOptions
+    site: Site
+    relief: Relief
+    town: Town
+    walls: list[Wall]
+    ceiling_m: float
+    uas: list[dict[str, Any]]
+    seen: list[tuple[Area, Look]]
+    waypoints: Waypoints
+    n_cameras: int
+
+    def tables(self) -> dict[str, Any]:
+        """The tables of the scenario."""
+        waypoints, options = self.waypoints.all(), self.options
+        again = any("again_after_s" in table for table in waypoints)
+        speed = {} if options.speed_mps is None else {"speed_mps": options.speed_mps}
+        execution = {"execution": {"flown_by": options.flown_by, **speed}}
+        return {
+            "schema": 1,
+            "dt_s": 1.0,
+            "max_steps": _MOST_STEPS,
+            "landing_distance_m": 2.0,
+            "landing_speed_mps": 0.5,
+            "uas_safe_distance_m": UAS_SAFE_DISTANCE_M,
+            "geofence": {
+                "margin_m": FENCE_MARGIN_M,
+                "vertices_m": _prism(self.site.fence, self.ceiling_m),
+            },
+            "obstacles": [
+                {
+                    "name": f"{wall.kind}_{n + 1}",
+                    "kind": wall.kind,
+                    "safe_distance_m": wall.safe_distance_m,
+                    "vertices_m": _prism(wall.footprint, wall.top_m),
+                }
+                for n, wall in enumerate(self.walls)
+            ],
+            "uas": self.uas,
+            "waypoints": waypoints,
+            "decorations": [
+                *_decorations(self.seen, several=self.n_cameras > 1),
+                *_streets(self.town),
+            ],
+            "place": self.site.frame.place.model_dump(),
+            **({"relaunch": True} if again else {}),
+            **({"min_height_m": options.min_height_m} if options.min_height_m else {}),
+            **(execution if options.flown_by else {}),
+        }
+
+    def notes(self, things: Sequence[Drawn], scenario: Scenario) -> Iterator[str]:
+        """Lines for the user."""
+        site, walls, waypoints = self.site, self.walls, self.waypoints
+        uneven = self.relief.ground is not None
+        yield from look_notes(self.seen, waypoints.above_m, uneven=uneven)
+        yield (
+            f"fence of {site.fence.area / 1e4:.1f} ha, {self.ceiling_m:g} m high; {len(walls)} "
+            f"obstacle{'' if len(walls) == 1 else 's'}"
+        )
+        if uneven:
+            yield self.relief.note(site)
+        yield from standing_notes([*site.standing, *self.town.standing], self.town)
+        yield from drawn_notes(things, site, [table["name"] for table in self.uas], self.town)
+        if scenario.relaunch:
+            visits = sum(waypoint.visits for waypoint in scenario.waypoints)
+            yield (
+                f"{len(scenario.waypoints)} waypoints, to be covered {visits} times in all: UAS "
+                f"take off again (relaunch = true) on what their charge leaves; [sorties] gives "
+                f"them packs"
+            )
+        if waypoints.too_high:
+            yield (
+                f"{waypoints.too_high} waypoints lie higher above the ground than asked: it is "
+                f"below the take-off places, and no UAS flies below them"
+            )
+        if waypoints.left_out_m2 >= 0.5:
+            out_m2 = waypoints.left_out_m2
+            yield f"left out: {out_m2:.0f} m² that are seen from no place a UAS may take"
+
+
+def _mission(things: Sequence[Drawn], options: ImportOptions) -> _Mission:
+    """What the scenario is made of."""
     fleet = parse_fleet(options.fleet)
     looks = _looks(fleet, options)
     highest_m = _highest_m(things, looks, options)
-    ceiling_m, relief = _ceiling_m(highest_m, options), Relief()
-    site = make_site(things, options.homes, ceiling_m)
+    site, relief = make_site(things, options.homes), Relief()
     uas = _fleet_tables(fleet, looks, site, SPARE_M + (_FILES_OFF_M if options.flown_by else 0.0))
     if options.terrain is not None:
         starts_m = np.array([table["start_m"][1::-1] for table in uas])
         relief = relief_of(options.terrain, site, starts_m)
-        rise_m = relief.highest_m([area.shape for area in site.areas])
-        ceiling_m = _ceiling_m(highest_m + rise_m, options)
-        site = make_site(things, options.homes, ceiling_m, relief.start_m)
+        site = replace(site, frame=site.frame.at_height(round(relief.start_m or 0.0, 3)))
+    rise_m = relief.highest_m([area.shape for area in site.areas])
+    ceiling_m = _ceiling_m(highest_m + rise_m, options)
     town = read_town(options.town, site.frame, site.fence) if options.town else Town()
     standing = [_raised(thing, relief) for thing in (*site.standing, *town.standing)]
     higher = [thing for thing in standing if thing.height_m >= _LOWEST_ROOF_M]
-    zones = [wall for zone in town.no_fly for wall in no_fly_walls(zone, ceiling_m)]
-    walls = [*site.no_fly, *zones, *relief.walls, *town_walls(higher, site.fence)]
+    walls = [
+        *zone_walls(site, town.no_fly, ceiling_m),
+        *relief.walls,
+        *town_walls(higher, site.fence),
+    ]
     _check_starts(uas, walls, site)
     seen = [(area, _look(looks, area, options)) for area in site.areas]
     asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
     speed_mps, again_after_s = options.max_speed_mps, options.again_after_s
     asked = Asked(options.radius_m, speed_mps, options.min_height_m, asks, again_after_s)
     waypoints = make_waypoints(site, relief, walls, seen, ceiling_m, asked)
-    tables = {
-        "schema": 1,
-        "name": name,
-        "dt_s": 1.0,
-        "max_steps": _MOST_STEPS,
-        "landing_distance_m": 2.0,
-        "landing_speed_mps": 0.5,
-        "uas_safe_distance_m": UAS_SAFE_DISTANCE_M,
-        "geofence": {
-            "margin_m": FENCE_MARGIN_M,
-            "vertices_m": _prism(site.fence, ceiling_m),
-        },
-        "obstacles": [
-            {
-                "name": f"{wall.kind}_{n + 1}",
-                "kind": wall.kind,
-                "safe_distance_m": wall.safe_distance_m,
-                "vertices_m": _prism(wall.footprint, wall.top_m),
-            }
-            for n, wall in enumerate(walls)
-        ],
-        "uas": uas,
-        "waypoints": waypoints.all(),
-        "decorations": [
-            *_decorations(seen, several=len(looks) > 1),
-            *_streets(town),
-        ],
-        "place": site.frame.place.model_dump(),
-        **({"min_height_m": options.min_height_m} if options.min_height_m else {}),
-        **({"execution": _execution(options)} if options.flown_by else {}),
-    }
-    scenario = _finite(parse(tables, Scenario, name))
-    if scenario.asks_again:
-        scenario = scenario.model_copy(update={"relaunch": True})
-    notes = [
-        *look_notes(seen, waypoints.above_m, uneven=relief.ground is not None),
-        f"fence of {site.fence.area / 1e4:.1f} ha, {ceiling_m:g} m high; {len(walls)} "
-        f"obstacle{'' if len(walls) == 1 else 's'}",
-        *([relief.note(site)] if relief.ground else []),
-        *standing_notes([*site.standing, *town.standing], town),
-        *drawn_notes(things, site, [table["name"] for table in uas], town),
-    ]
-    if scenario.asks_again:
-        visits = sum(waypoint.visits for waypoint in scenario.waypoints)
-        notes.append(
-            f"{len(scenario.waypoints)} waypoints, to be covered {visits} times in all: UAS take "
-            f"off again (relaunch = true) on what their charge leaves; [sorties] gives them packs"
-        )
-    if waypoints.too_high:
-        notes.append(
-            f"{waypoints.too_high} waypoints lie higher above the ground than asked: it is below "
-            f"the take-off places, and no UAS flies below them"
-        )
-    if waypoints.left_out_m2 >= 0.5:
-        out_m2 = waypoints.left_out_m2
-        notes.append(f"left out: {out_m2:.0f} m² that are seen from no place a UAS may take")
-    return Imported(
-        scenario, tuple(notes), town.credit if town.standing or town.streets or town.no_fly else ""
-    )
+    return _Mission(options, site, relief, town, walls, ceiling_m, uas, seen, waypoints, len(looks))
 
 
 def _looks(fleet: Sequence[Member], options: ImportOptions) -> tuple[Look, ...]:
@@ -248,7 +284,7 @@ def _highest_m(things: Sequence[Drawn], looks: Sequence[Look], options: ImportOp
 def _ceiling_m(highest_m: float, options: ImportOptions) -> float:
     if options.ceiling_m is None:
         return highest_m + _ABOVE_WAYPOINTS_M
-    _within("--ceiling", options.ceiling_m, highest_m + options.radius_m, 2_000.0)
+    check_within("--ceiling", options.ceiling_m, highest_m + options.radius_m, 2_000.0)
     return options.ceiling_m
 
 
@@ -279,29 +315,19 @@ def _check_starts(uas: Sequence[dict[str, Any]], walls: Sequence[Wall], site: Si
                 )
 
 
-def _execution(options: ImportOptions) -> dict[str, Any]:
-    speed = {} if options.speed_mps is None else {"speed_mps": options.speed_mps}
-    return {"flown_by": options.flown_by, **speed}
-
-
 def _check(options: ImportOptions) -> None:
     if options.flown_by is not None:
         check_choice("--flown-by", options.flown_by, FLOWN_BY)
     if options.speed_mps is not None:
         if options.flown_by is None:
             raise InputError("--speed is an autopilot's; add --flown-by autopilot")
-        _within("--speed", options.speed_mps, 0.5, 100.0)
-    _within("--height", options.height_m, 1.0, 1_000.0)
-    _within("--radius", options.radius_m, 0.5, 1_000.0)
-    _within("--min-height", options.min_height_m, 0.0, 100.0)
-    _within("--overlap", options.overlap, 0.0, 0.9)
+        check_within("--speed", options.speed_mps, 0.5, 100.0)
+    check_within("--height", options.height_m, 1.0, 1_000.0)
+    check_within("--radius", options.radius_m, 0.5, 1_000.0)
+    check_within("--min-height", options.min_height_m, 0.0, 100.0)
+    check_within("--overlap", options.overlap, 0.0, 0.9)
     if options.max_speed_mps is not None:
-        _within("--max-speed", options.max_speed_mps, 0.5, 100.0)
-
-
-def _within(name: str, value: float, least: float, most: float) -> None:
-    if not least <= value <= most:
-        raise InputError(f"{name} {value:g}: should be between {least:g} and {most:g}")
+        check_within("--max-speed", options.max_speed_mps, 0.5, 100.0)
 
 
 def _finite(scenario: Scenario) -> Scenario:

@@ -92,7 +92,8 @@ class Site:
         homes: The take-off places.
         homes_m: East and north of these.
         fence: Convex; what lies in it but outside the drawn fence is walled off.
-        no_fly: Walls that reach beyond the ceiling.
+        no_fly: Zones that no UAS flies into.
+        outside_fence: Convex pieces of what lies in `fence`, but outside the drawn one.
         standing: What was drawn as standing there.
         outside: What was drawn as such or as a no-fly zone outside the fence.
         notes: What is to be said of it.
@@ -103,44 +104,28 @@ class Site:
     homes: tuple[TakeOff, ...]
     homes_m: tuple[tuple[float, float], ...]
     fence: Polygon
-    no_fly: tuple[Wall, ...]
+    no_fly: tuple[Polygon, ...]
+    outside_fence: tuple[Polygon, ...]
     standing: tuple[Standing, ...] = ()
     outside: tuple[DrawnPolygon, ...] = ()
     notes: tuple[str, ...] = ()
 
 
-def make_site(
-    things: Sequence[Drawn],
-    homes: Sequence[tuple[float, float]],
-    ceiling_m: float,
-    start_m: float | None = None,
-) -> Site:
+def make_site(things: Sequence[Drawn], homes: Sequence[tuple[float, float]]) -> Site:
     """The site that was drawn.
 
     Args:
         things: Polygons and take-off places.
         homes: Latitude and longitude of take-off places, in place of the drawn ones [degrees].
-        ceiling_m: Top of the fence above the ground [m].
-        start_m: Height of the take-off places; None: as a drawing says [m].
 
     Raises:
         InputError: Something in it cannot be meant.
     """
-    frame = _with_height(frame_around(list(things)), things, start_m)
+    frame = _with_height(frame_around(list(things)), things)
     polygons = [
         (thing, local_polygon(frame, thing)) for thing in things if isinstance(thing, DrawnPolygon)
     ]
-    places = take_off_places(things, homes)
-    if not places:
-        points = [
-            thing.name for thing in things if isinstance(thing, LeftOut) and thing.what == "point"
-        ]
-        said = f" (no take-off places: {', '.join(map(repr, points[:3]))})" if points else ""
-        middle = f"{frame.place.latitude_deg:.5f},{frame.place.longitude_deg:.5f}"
-        raise InputError(
-            f"no take-off place: draw a point, or give --home LAT,LON near the areas, whose middle "
-            f"is {middle}{said}"
-        )
+    places = _take_off_places(things, homes, frame)
     homes_m = tuple(local_place(frame, place) for place in places)
     areas = _apart(
         [Area(t.weight, a, t.camera, t.source, t.wishes) for t, a in polygons if t.role == "search"]
@@ -151,42 +136,46 @@ def make_site(
     for thing, area in polygons:
         if thing.role == "search" and area.difference(within).area > 1.0:
             raise InputError(f"{thing.source} reaches beyond the fence; enlarge the fence")
-    top_m = ceiling_m + _ABOVE_CEILING_M
-    walls = [
-        wall for t, area in polygons if t.role == "no_fly" for wall in no_fly_walls(area, ceiling_m)
-    ]
-    if not drawn_fence.is_empty:
-        walls += [
-            Wall("outside_fence", piece, top_m, FENCE_MARGIN_M)
-            for part in shapely.get_parts(fence.difference(drawn_fence))
-            if isinstance(part, Polygon) and not part.buffer(-_SLIVER_M).is_empty
-            for whole in without_holes(part)
-            for piece in convex_pieces(whole, 1.0 + 1e-9)
-        ]
     standing = [
         Standing(thing.solid.kind, area, thing.solid.height_m, thing.solid.known)
         for thing, area in polygons
         if thing.solid is not None
     ]
-    met = tuple(wall for wall in walls if wall.footprint.intersects(fence))
-    outside = tuple(
-        thing
-        for thing, area in polygons
-        if thing.role in ("no_fly", "obstacle") and not area.intersects(fence)
+    return Site(
+        frame=frame,
+        areas=areas,
+        homes=places,
+        homes_m=homes_m,
+        fence=fence,
+        no_fly=tuple(area for thing, area in polygons if thing.role == "no_fly"),
+        outside_fence=tuple(_outside(fence, drawn_fence)),
+        standing=tuple(standing),
+        outside=tuple(
+            thing
+            for thing, area in polygons
+            if thing.role in ("no_fly", "obstacle") and not area.intersects(fence)
+        ),
+        notes=tuple(notes),
     )
-    return Site(frame, areas, places, homes_m, fence, met, tuple(standing), outside, tuple(notes))
 
 
-def no_fly_walls(zone: Polygon, ceiling_m: float) -> list[Wall]:
-    """Walls that hold a no-fly zone.
+def zone_walls(site: Site, more: Sequence[Polygon], ceiling_m: float) -> list[Wall]:
+    """Walls that reach beyond the ceiling: no-fly zones, and what is outside the drawn fence.
 
     Args:
-        zone: x east, y north [m].
+        site: The site.
+        more: Further no-fly zones (x east, y north) [m].
         ceiling_m: Top of the fence above the ground [m].
     """
     top_m = ceiling_m + _ABOVE_CEILING_M
-    pieces = convex_pieces(zone, _NO_FLY_SLACK)
-    return [Wall("no_fly", piece, top_m, SAFE_DISTANCE_M) for piece in pieces]
+
+    def no_fly(zones: Sequence[Polygon]) -> list[Wall]:
+        pieces = [piece for zone in zones for piece in convex_pieces(zone, _NO_FLY_SLACK)]
+        return [Wall("no_fly", piece, top_m, SAFE_DISTANCE_M) for piece in pieces]
+
+    outside = [Wall("outside_fence", piece, top_m, FENCE_MARGIN_M) for piece in site.outside_fence]
+    drawn = [*no_fly(site.no_fly), *outside]
+    return [wall for wall in drawn if wall.footprint.intersects(site.fence)] + no_fly(more)
 
 
 def town_walls(standing: Sequence[Standing], fence: Polygon) -> list[Wall]:
@@ -228,30 +217,47 @@ def _drawn_fence(
     return within, []
 
 
-def _with_height(frame: LocalFrame, things: Sequence[Drawn], start_m: float | None) -> LocalFrame:
-    """The height of the ground: given, or what a file tells with a take-off place."""
-    if start_m is not None:
-        return LocalFrame(frame.place.model_copy(update={"height_m": round(start_m, 3)}))
+def _with_height(frame: LocalFrame, things: Sequence[Drawn]) -> LocalFrame:
+    """The frame with the height of the ground that a file tells with a take-off place."""
     for thing in things:
         if isinstance(thing, TakeOff) and thing.height_m is not None:
             if not -1_000.0 <= thing.height_m <= 10_000.0:
                 raise InputError(f"{thing.source}: height {thing.height_m:g} m is on no ground")
-            return LocalFrame(frame.place.model_copy(update={"height_m": thing.height_m}))
+            return frame.at_height(thing.height_m)
     return frame
 
 
-def take_off_places(
-    things: Sequence[Drawn], homes: Sequence[tuple[float, float]]
+def _take_off_places(
+    things: Sequence[Drawn], homes: Sequence[tuple[float, float]], frame: LocalFrame
 ) -> tuple[TakeOff, ...]:
-    """The take-off places: given ones, else points said to be, else those that say nothing.
-
-    Args:
-        things: What was drawn.
-        homes: Latitude and longitude of given ones [degrees].
-    """
+    """The take-off places: given ones, else points said to be, else those that say nothing."""
     drawn = [thing for thing in things if isinstance(thing, TakeOff)]
     said = [place for place in drawn if place.said]
-    return tuple([TakeOff("--home", *home) for home in homes] or said or drawn)
+    places = tuple([TakeOff("--home", *home) for home in homes] or said or drawn)
+    if not places:
+        points = [
+            thing.name for thing in things if isinstance(thing, LeftOut) and thing.what == "point"
+        ]
+        other = f" (no take-off places: {', '.join(map(repr, points[:3]))})" if points else ""
+        middle = f"{frame.place.latitude_deg:.5f},{frame.place.longitude_deg:.5f}"
+        raise InputError(
+            f"no take-off place: draw a point, or give --home LAT,LON near the areas, whose middle "
+            f"is {middle}{other}"
+        )
+    return places
+
+
+def _outside(fence: Polygon, drawn: BaseGeometry) -> list[Polygon]:
+    """Convex pieces of a fence that are outside the drawn one; none where none was drawn."""
+    if drawn.is_empty:
+        return []
+    return [
+        piece
+        for part in shapely.get_parts(fence.difference(drawn))
+        if isinstance(part, Polygon) and not part.buffer(-_SLIVER_M).is_empty
+        for whole in without_holes(part)
+        for piece in convex_pieces(whole, 1.0 + 1e-9)
+    ]
 
 
 def _apart(areas: list[Area]) -> tuple[Area, ...]:

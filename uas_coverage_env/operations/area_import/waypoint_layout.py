@@ -4,7 +4,7 @@ Where a cell lies under something high or partly outside the area, its waypoint 
 divided, and only what cannot be seen from any allowed place is left out and said to be.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,7 +116,3 @@ def _quarters(west: float, south: float, east: float, north: float) -> Iterator[
     for x0, x1 in ((west, x), (x, east)):
         for y0, y1 in ((south, y), (y, north)):
             yield shapely.box(x0, y0, x1, y1)
-
-
-Heights = Callable[[float, float], float]
-"""Altitude of a waypoint [m] at a place east and north [m]."""

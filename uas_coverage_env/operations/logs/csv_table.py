@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.files.plain_files import read_text
+from uas_coverage_env.files.plain_files import decoded
 from uas_coverage_env.operations.logs.logged import Logged, Span
 
 NEEDED = ("t_s", "latitude_deg", "longitude_deg", "height_m")
@@ -26,14 +26,14 @@ MEANINGS = {
     "current_A": "battery",
 }
 """Column -> what it is read for; they may stand in any order, and others are left alone."""
-_MOST_BYTES = 200_000_000
 
 
-def read_table(path: Path, battery: int | None) -> list[Logged]:
+def read_table(path: Path, content: bytes, battery: int | None) -> list[Logged]:
     """What a table holds; columns may stand in any order, and others are left alone.
 
     Args:
         path: The file.
+        content: What it holds.
         battery: None: a table has one.
 
     Raises:
@@ -42,7 +42,7 @@ def read_table(path: Path, battery: int | None) -> list[Logged]:
     if battery not in (None, 1):
         raise InputError(f"{path}: has no battery monitor {battery}; a table has one")
     try:
-        rows = list(csv.reader(io.StringIO(read_text(path, _MOST_BYTES))))
+        rows = list(csv.reader(io.StringIO(decoded(content))))
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: is no table of text: {error}") from error
     header = [name.strip() for name in rows[0]] if rows else []

@@ -6,8 +6,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.operations.logs import csv_table, dataflash, telemetry, ulog
 from uas_coverage_env.operations.logs.logged import Logged, limited
+
+_MOST_BYTES = 500_000_000
 
 
 class Format(NamedTuple):
@@ -15,12 +18,13 @@ class Format(NamedTuple):
 
     Attributes:
         of: What it is, in words.
-        read: What reads it: a file, and a battery monitor from 1 on, None for the first.
+        read: What reads it: a file, what it holds, and a battery monitor from 1 on, None for the
+            first.
         messages: What is read of it -> what for.
     """
 
     of: str
-    read: Callable[[Path, int | None], list[Logged]]
+    read: Callable[[Path, bytes, int | None], list[Logged]]
     messages: Mapping[str, str]
 
 
@@ -58,5 +62,13 @@ def read_log(path: Path, battery: int | None = None) -> list[Logged]:
     kind = FORMATS.get(path.suffix.lower())
     if kind is None:
         raise InputError(f"{path}: unknown kind of log; give {', '.join(FORMATS)}")
-    found = [limited(path, logged) for logged in kind.read(path, battery)]
-    return [replace(logged, source=str(path)) for logged in found]
+    content = read_bytes(path, _MOST_BYTES)  # a plain file, and no device to listen to
+    if not content:
+        raise InputError(f"{path}: is empty")
+    try:
+        found = kind.read(path, content, battery)
+    except (ModuleNotFoundError, InputError):
+        raise
+    except Exception as error:  # parsers raise whatever a damaged file makes them
+        raise InputError(f"{path}: cannot be read as a log: {error}") from error
+    return [replace(limited(path, logged), source=str(path)) for logged in found]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.errors import InputError, check_within
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight, SceneHistory, covered_at, sorties_summary
 from uas_coverage_env.operations.flight_checks import check_flight, place_of_flight
@@ -191,16 +191,11 @@ def _check(options: ExportOptions, settled: Settled) -> None:
         check_choice("--firmware", options.firmware, FIRMWARES)
         if options.firmware == PX4 and options.kind == "ardupilot":
             raise InputError("--firmware px4: --format ardupilot is of ArduPilot; take qgc")
-    for name, value in (
-        ("--tolerance", settled.tolerances.path_m),
-        ("--corner", settled.tolerances.corner_m),
-    ):
-        if not 0.1 <= value <= MOST_TOLERANCE_M:
-            raise InputError(f"{name} {value:g}: should be between 0.1 and {MOST_TOLERANCE_M:g}")
-    if not 0.0 <= settled.min_slack_s <= 3_600.0:
-        raise InputError(f"--min-slack {settled.min_slack_s:g}: should be between 0 and 3600")
-    if settled.wind_mps is not None and not 0.0 <= settled.wind_mps <= 60.0:
-        raise InputError(f"--wind {settled.wind_mps:g}: should be between 0 and 60")
+    check_within("--tolerance", settled.tolerances.path_m, 0.1, MOST_TOLERANCE_M)
+    check_within("--corner", settled.tolerances.corner_m, 0.1, MOST_TOLERANCE_M)
+    check_within("--min-slack", settled.min_slack_s, 0.0, 3_600.0)
+    if settled.wind_mps is not None:
+        check_within("--wind", settled.wind_mps, 0.0, 60.0)
 
 
 def _as_asked(flight: Flight, track: Track, tolerances: Tolerances) -> Track:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
 
-from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.files.errors import InputError, check_within
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.operations.flight_checks import check_flight
@@ -129,13 +129,9 @@ def _check_pace(
 
 
 def _check(options: StreamOptions) -> None:
-    for name, value, low, high in (
-        ("--lag", options.lag_m, 1.0, 100.0),
-        ("--patience", options.patience_s, 1.0, 3_600.0),
-        ("--late", 100.0 * options.late, 0.0, 1_000.0),
-    ):
-        if not low <= value <= high:
-            raise InputError(f"{name} {value:g}: should be between {low:g} and {high:g}")
+    check_within("--lag", options.lag_m, 1.0, 100.0)
+    check_within("--patience", options.patience_s, 1.0, 3_600.0)
+    check_within("--late", 100.0 * options.late, 0.0, 1_000.0)
     check_choice("--on-abort", options.reaction, tuple(REACTIONS))
 
 
