@@ -89,35 +89,17 @@ def make_waypoints(
     Raises:
         InputError: There is no place for them, or there are too many.
     """
-    low, high = [], []
-    for wall in walls:
-        fits = _over_m(wall, asked) <= ceiling_m - FENCE_MARGIN_M
-        (low if fits else high).append(wall)
-    allowed = site.fence.buffer(-(FENCE_MARGIN_M + KEEP_M)).difference(
-        shapely.union_all([wall.footprint.buffer(wall.safe_distance_m + KEEP_M) for wall in high])
-    )
-    if allowed.is_empty:
-        raise InputError("no waypoint has room in the fence; enlarge the fence")
-    roofs = shapely.STRtree([w.footprint.buffer(w.safe_distance_m + KEEP_M) for w in low])
+    placed = _Placed(site, relief, walls, ceiling_m, asked)
     found = Waypoints()
     for number, (area, look) in enumerate(seen):
-        layout = lay_waypoints(area.shape, look.pitch_m, allowed, f"area {number + 1}")
+        layout = lay_waypoints(area.shape, look.pitch_m, placed.allowed, f"area {number + 1}")
         found.left_out_m2 += layout.left_out_m2
         found.above_m.append([])
-        for east_m, north_m in layout.places_m:
-            under = roofs.query(Point(east_m, north_m), "intersects")
-            low_m, high_m = relief.range_m(*_seen_from(east_m, north_m, look))
-            height_m = look.height_m + high_m
-            least_m = 0.0 if relief.ground is None else asked.radius_m + _LIFT_M
-            found.too_high += height_m < least_m
-            height_m = max(height_m, least_m, *(_over_m(low[k], asked) for k in under))
-            if relief.ground is not None and height_m > ceiling_m - FENCE_MARGIN_M - KEEP_M:
-                raise InputError(
-                    f"--ceiling {ceiling_m:g}: the ground asks for a waypoint {height_m:.0f} m "
-                    f"above the take-off places; raise it, or leave it out"
-                )
-            found.above_m[-1].append(height_m - low_m)
-            position_m = (north_m, east_m, -height_m)
+        for place_m in layout.places_m:
+            height_m, above_m, too_high = placed.height_m(place_m, look)
+            found.too_high += too_high
+            found.above_m[-1].append(above_m)
+            position_m = (*place_m[::-1], -height_m)
             found.tables.setdefault(look.name, []).append(
                 {
                     "kind": "search",
@@ -136,6 +118,40 @@ def make_waypoints(
     if not count:
         raise InputError("nothing of the areas is seen from any place that a UAS may take")
     return found
+
+
+class _Placed:
+    """Where waypoints may be, and how high; arguments as of `make_waypoints`."""
+
+    def __init__(
+        self, site: Site, relief: Relief, walls: Sequence[Wall], ceiling_m: float, asked: Asked
+    ) -> None:
+        top_m = ceiling_m - FENCE_MARGIN_M
+        kept = [(wall, wall.footprint.buffer(wall.safe_distance_m + KEEP_M)) for wall in walls]
+        high = [around for wall, around in kept if _over_m(wall, asked) > top_m]
+        low = [(wall, around) for wall, around in kept if _over_m(wall, asked) <= top_m]
+        room = site.fence.buffer(-(FENCE_MARGIN_M + KEEP_M))
+        self.allowed = room.difference(shapely.union_all(high))
+        if self.allowed.is_empty:
+            raise InputError("no waypoint has room in the fence; enlarge the fence")
+        self._over_m = [_over_m(wall, asked) for wall, _ in low]
+        self._roofs = shapely.STRtree([around for _, around in low])
+        self._relief, self._ceiling_m, self._asked = relief, ceiling_m, asked
+
+    def height_m(self, place_m: tuple[float, float], look: Look) -> tuple[float, float, bool]:
+        """Height of a waypoint, that above the lowest ground it sees [m]; more than is asked?"""
+        uneven = self._relief.ground is not None
+        low_m, high_m = self._relief.range_m(*_seen_from(*place_m, look))
+        asked_m = look.height_m + high_m
+        least_m = self._asked.radius_m + _LIFT_M if uneven else 0.0
+        under = self._roofs.query(Point(place_m), "intersects")
+        height_m = max(asked_m, least_m, *(self._over_m[k] for k in under))
+        if uneven and height_m > self._ceiling_m - FENCE_MARGIN_M - KEEP_M:
+            raise InputError(
+                f"--ceiling {self._ceiling_m:g}: the ground asks for a waypoint {height_m:.0f} m "
+                f"above the take-off places; raise it, or leave it out"
+            )
+        return height_m, height_m - low_m, asked_m < least_m
 
 
 def _over_m(wall: Wall, asked: Asked) -> float:

@@ -18,10 +18,15 @@ from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.mission_export.failure_responses import not_safe
 from uas_coverage_env.operations.mission_export.formats import AUTOPILOTS, FORMATS
 from uas_coverage_env.operations.mission_export.formats.parameters import FIRMWARES, PX4
-from uas_coverage_env.operations.mission_export.mission_file import Exported, followed, waiting
+from uas_coverage_env.operations.mission_export.mission_file import (
+    Exported,
+    Settled,
+    followed,
+    waiting,
+)
 from uas_coverage_env.operations.mission_export.report import report
 from uas_coverage_env.operations.mission_export.report_page import report_page
-from uas_coverage_env.operations.mission_export.scheduling import Begins, Part, Settled, kept_apart
+from uas_coverage_env.operations.mission_export.scheduling import Begins, Part, kept_apart
 from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track, make_tracks
 from uas_coverage_env.operations.mission_export.waypoint_requirements import stopping
 from uas_coverage_env.planning.execution.leg_model import Followed

@@ -36,6 +36,22 @@ _LANDING = 1.1
 """Of the time that landing is expected to take, what is allowed for it."""
 
 
+class Settled(NamedTuple):
+    """What options and scenario say together.
+
+    Attributes:
+        tolerances: How far an autopilot may be from the flight.
+        min_slack_s: How late any UAS has to be able to be [s].
+        wind_mps: The worst wind that charges are counted in; None: that of the scenario [m/s].
+        px4: Whether PX4 flies the files; else, ArduPilot.
+    """
+
+    tolerances: Tolerances
+    min_slack_s: float
+    wind_mps: float | None = None
+    px4: bool = False
+
+
 class Start(NamedTuple):
     """How a file begins.
 
@@ -125,15 +141,7 @@ def followed(track: Track, scenario: Scenario, tolerances: Tolerances, waits: Wa
 
 
 def exported(
-    flight: Flight,
-    track: Track,
-    frame: LocalFrame,
-    tolerances: Tolerances,
-    waits: Waits = Waits(),  # noqa: B008 (immutable)
-    start: Start | None = None,
-    wind_mps: float | None = None,
-    *,
-    px4: bool = False,
+    flight: Flight, track: Track, frame: LocalFrame, settled: Settled, waits: Waits, start: Start
 ) -> Exported:
     """What there is to say about a track.
 
@@ -141,34 +149,34 @@ def exported(
         flight: What was flown.
         track: A sortie of it.
         frame: Where on the Earth.
-        tolerances: Those of the export.
+        settled: How it is exported.
         waits: Where it waits for others.
-        start: When it is started, and how much is in its battery; None: first of all, as planned.
-        wind_mps: The worst wind; None: that of the scenario [m/s].
-        px4: Whether PX4 flies it; else, ArduPilot.
+        start: When it is started, and how much is in its battery.
     """
-    scenario, vehicle = flight.scenario, flight.scenario.vehicles[track.uas]
-    soc_0 = scenario.uas[track.uas].soc_0
-    begins = start or Start(0.0, 0.0, soc_0, soc_0)
-    flown, speeds_mps = followed(track, scenario, tolerances, waits), file_speeds(track, scenario)
+    scenario, uas = flight.scenario, flight.scenario.uas[track.uas]
+    vehicle, corner_m = scenario.vehicles[track.uas], settled.tolerances.corner_m
+    flown = followed(track, scenario, settled.tolerances, waits)
+    speeds_mps, holds_s = file_speeds(track, scenario), file_holds(track, waits)
+    by, wind_mps = Autopilot.of(vehicle, corner_m), settled.wind_mps
     wind_mps = worst_wind_mps(scenario, track) if wind_mps is None else wind_mps
-    by, holds_s = Autopilot.of(vehicle, tolerances.corner_m), file_holds(track, waits)
     home = homeward(
         *(scenario, track, flown, by),
         holds_s=holds_s,
-        begins_s=begins.at_s,
-        others=begins.others,
-        nearer_end=px4,
+        begins_s=start.at_s,
+        others=start.others,
+        nearer_end=settled.px4,
     )
     take = partial(charged, flight, track, flown, speeds_mps, home)
-    still = take(begins.soc)
-    in_wind = take(begins.soc_in_wind, wind_mps) if wind_mps else None
+    still = take(start.soc)
+    in_wind = take(start.soc_in_wind, wind_mps) if wind_mps else None
     highest_m = max(-float(flown.places_m[:, 2].min()), home.height_m or 0.0)
+    lands_s = _LANDING * landing_s(highest_m, by)
+    limits = {"dod_max": uas.dod_max, "soc_start": start.soc, "soc_fresh": uas.soc_0}
     return Exported(
         track=track,
-        begins_s=begins.at_s,
-        delay_s=begins.delay_s,
-        soc_0=begins.soc,
+        begins_s=start.at_s,
+        delay_s=start.delay_s,
+        soc_0=start.soc,
         speeds_mps=speeds_mps,
         holds_s=holds_s,
         waits=waits,
@@ -176,19 +184,12 @@ def exported(
         still=still,
         in_wind=in_wind,
         home=home,
-        levels=levels(
-            vehicle,
-            in_wind or still,
-            _LANDING * landing_s(highest_m, by),
-            dod_max=scenario.uas[track.uas].dod_max,
-            soc_start=begins.soc,
-            soc_fresh=soc_0,
-        ),
+        levels=levels(vehicle, in_wind or still, lands_s, **limits),
         vehicle=vehicle,
         frame=frame,
-        looks_ahead=scenario.uas[track.uas].heading == "course",
+        looks_ahead=uas.heading == "course",
         not_as_asked=tuple(not_as_asked(scenario, track, flown)),
-        triggers_m=triggers_m(scenario, track, tolerances.corner_m),
+        triggers_m=triggers_m(scenario, track, corner_m),
     )
 
 

@@ -15,10 +15,11 @@ from uas_coverage_env.operations.mission_export.failure_responses import (
 from uas_coverage_env.operations.mission_export.formats.geofence import ZONES
 from uas_coverage_env.operations.mission_export.mission_file import (
     Exported,
+    Settled,
     waiting,
     waypoint_margins,
 )
-from uas_coverage_env.operations.mission_export.scheduling import Part, Settled
+from uas_coverage_env.operations.mission_export.scheduling import Part
 from uas_coverage_env.planning.execution.lateness import Pair
 
 

@@ -1,6 +1,6 @@
 """The map of an export's report: the mission from above, as SVG."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
@@ -11,7 +11,9 @@ from uas_coverage_env.draw.terrain import scale_step_m
 from uas_coverage_env.flight.seen import SEARCH_AREA
 from uas_coverage_env.operations.convex import hull_of
 from uas_coverage_env.operations.mission_export.formats.geofence import ZONES
+from uas_coverage_env.operations.mission_export.mission_file import Exported
 from uas_coverage_env.operations.mission_export.scheduling import Part
+from uas_coverage_env.operations.mission_export.tracks import FloatArray
 from uas_coverage_env.scenario import Decoration, Obstacle
 
 # custom properties of the page's style, so that it can be light or dark
@@ -65,34 +67,11 @@ def map_of(parts: Sequence[Part]) -> str:
         f"{_drawn(pen / 2, _WAYPOINT)}/>"
         for w in scenario.waypoints
     ]
-    homes: dict[str, tuple[float, float]] = {}
     names = parts[0].flight.names
     files = [(n, one) for n, name in enumerate(names) for part in parts for one in part.of(name)]
     for n, one in files:
-        colour = _colour(n)
-        line = " ".join(f"{y:.1f},{-x:.1f}" for x, y, _ in one.track.corners_m)
-        shapes.append(
-            f'<polyline points="{line}" {_drawn(1.5 * pen, colour)}>'
-            f"<title>{escape(one.track.name)}</title></polyline>"
-        )
-        x, y, _ = one.track.home_m
-        shapes.append(f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" {_filled(colour)}/>')
-        homes[names[n]] = (y, -x)
-        if one.track.lands_elsewhere:
-            x, y, _ = one.track.landing_m
-            shapes.append(
-                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{4 * pen}" {_drawn(2 * pen, colour)}>'
-                f"<title>{escape(one.track.name)}: landing</title></circle>"
-            )
-        lost = one.still.point_of_no_return
-        if lost is None and one.in_wind is not None:
-            lost = one.in_wind.point_of_no_return
-        if lost is not None:
-            x, y, _ = one.track.legs[lost].end_m
-            shapes.append(
-                f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{6 * pen}" {_drawn(2 * pen, _BAD)}>'
-                f"<title>{escape(one.track.name)}: point of no return</title></circle>"
-            )
+        shapes += _file(one, _colour(n), pen)
+    homes = {names[n]: (one.track.home_m[1], -one.track.home_m[0]) for n, one in files}
     around = 0.02 * span_m
     for name, (x, y) in homes.items():
         shapes.append(_words(short_name(name), x, y - 6 * pen, pen, anchor="middle"))
@@ -101,6 +80,28 @@ def map_of(parts: Sequence[Part]) -> str:
     box = f"{low[1] - around:.1f} {-high[0] - around:.1f} {width:.1f} {height:.1f}"
     told = escape(f"Map, north up: fence, obstacles, waypoints, legs of {', '.join(homes)}")
     return f'<svg viewBox="{box}" role="img" aria-label="{told}">{"".join(shapes)}</svg>'
+
+
+def _file(one: Exported, colour: str, pen: float) -> Iterator[str]:
+    """The legs of a file, where it begins and ends, and from where it does not come home."""
+    name = escape(one.track.name)
+
+    def ring(place_m: FloatArray, radius: float, style: str, title: str = "") -> str:
+        x, y, _ = place_m
+        text = f"><title>{title}</title></circle>" if title else "/>"
+        return f'<circle cx="{y:.1f}" cy="{-x:.1f}" r="{radius * pen}" {style}{text}'
+
+    line = " ".join(f"{y:.1f},{-x:.1f}" for x, y, _ in one.track.corners_m)
+    yield f'<polyline points="{line}" {_drawn(1.5 * pen, colour)}><title>{name}</title></polyline>'
+    yield ring(one.track.home_m, 4, _filled(colour))
+    if one.track.lands_elsewhere:
+        yield ring(one.track.landing_m, 4, _drawn(2 * pen, colour), f"{name}: landing")
+    lost = one.still.point_of_no_return
+    if lost is None and one.in_wind is not None:
+        lost = one.in_wind.point_of_no_return
+    if lost is not None:
+        style = _drawn(2 * pen, _BAD)
+        yield ring(one.track.legs[lost].end_m, 6, style, f"{name}: point of no return")
 
 
 def _words(text: str, x: float, y: float, pen: float, anchor: str = "start") -> str:

@@ -19,6 +19,7 @@ from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.mission_export.height_layers import Apart, in_layers
 from uas_coverage_env.operations.mission_export.mission_file import (
     Exported,
+    Settled,
     Start,
     exported,
     followed,
@@ -55,22 +56,6 @@ class Part:
     def of(self, name: str) -> list[Exported]:
         """The files of a UAS, one after the other."""
         return [one for one in self.exports if self.flight.names[one.track.uas] == name]
-
-
-class Settled(NamedTuple):
-    """What options and scenario say together.
-
-    Attributes:
-        tolerances: How far an autopilot may be from the flight.
-        min_slack_s: How late any UAS has to be able to be [s].
-        wind_mps: The worst wind that charges are counted in; None: that of the scenario [m/s].
-        px4: Whether PX4 flies the files; else, ArduPilot.
-    """
-
-    tolerances: Tolerances
-    min_slack_s: float
-    wind_mps: float | None = None
-    px4: bool = False
 
 
 class Begins(NamedTuple):
@@ -181,8 +166,7 @@ def _exports(
     waits: Sequence[Waits],
     begins_s: float,
 ) -> list[Exported]:
-    tolerances = settled.tolerances
-    flown = _flown(flight, tracks, tolerances, waits)
+    flown = _flown(flight, tracks, settled.tolerances, waits)
     starts = _starts(tracks, flown, waits, begins_s)
     last: dict[int, Exported] = {}
     result = []
@@ -200,8 +184,7 @@ def _exports(
             if o.uas != track.uas
         )
         start = Start(at_s, float(wait.start_s - inside.start_s), soc, soc_in_wind, others)
-        told = tolerances, inside, start, settled.wind_mps
-        one = exported(flight, track, frame, *told, px4=settled.px4)
+        one = exported(flight, track, frame, settled, inside, start)
         last[track.uas] = one
         result.append(one)
     return result

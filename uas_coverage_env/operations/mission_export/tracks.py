@@ -161,32 +161,19 @@ def make_track(
     Raises:
         InputError: No legs could be found that are free of contact.
     """
-    scenario = flight.scenario
     path = flight.x[sortie.first : sortie.landed, uas, 0:3]
     high = np.flatnonzero(-path[:, 2] >= TAKE_OFF_HEIGHT_M)
     if not len(high):
         return None
     first, last = int(high[0]), int(high[-1])
-    touches = first + np.flatnonzero(-path[first:last, 2] < _GROUND_M)
-    if len(touches):  # in a flight made of a log, which does not say that it has landed
-        at_s = (sortie.first + int(touches[0])) * scenario.dt_s
-        raise InputError(
-            f"{scenario.uas[uas].name} is on the ground {at_s:g} s after the start and flies on; "
-            f"export the flight that was planned instead"
-        )
+    _check_in_air(flight, uas, sortie, path[first:last], first)
     home_m, landing_m = (
         _place_m(flight, uas, sample) * (1.0, 1.0, 0.0) for sample in (sortie.first, sortie.landed)
     )
     builder = _Builder(flight, uas, sortie, _covered_by(flight, uas, sortie, covered), tolerances)
     take_off_m = np.array([*home_m[:2], path[first, 2]])
     above_m = np.array([*landing_m[:2], path[last, 2]])
-    points = [(take_off_m, first), (path[first], first), *builder.legs(first, last)]
-    if flight.scenario.execution is not None:
-        points = builder.sharpened(points)
-    if np.linalg.norm(points[0][0] - points[1][0]) <= 0.1:
-        del points[1]
-    if len(points) == 1 or np.linalg.norm(points[-1][0] - above_m) > 0.1:
-        points.append((above_m, last))
+    points = builder.corners(first, last, take_off_m, above_m)
     legs = tuple(
         Leg(end_m, sortie.first + j, builder.speed_mps(i, j), builder.around.room(start_m, end_m))
         for (start_m, i), (end_m, j) in pairwise(points)
@@ -196,10 +183,9 @@ def make_track(
     off_m = max(
         float(distances_m(path[i : j + 1], a, b).max()) for (a, i), (b, j) in pairwise(points)
     )
-    passed_m = builder.passed_m(corners, [leg.stop for leg in legs])
     track = Track(
         uas=uas,
-        name=scenario.uas[uas].name,
+        name=flight.scenario.uas[uas].name,
         sortie=sortie,
         home_m=home_m,
         landing_m=landing_m,
@@ -207,13 +193,12 @@ def make_track(
         legs=legs,
         off_m=off_m,
         waypoints=tuple(builder.waypoints),
-        passed_m=passed_m,
+        passed_m=builder.passed_m(corners, [leg.stop for leg in legs]),
         flown_m=path,
     )
+    up_m = (0.0, 0.0, TAKE_OFF_HEIGHT_M)
     ups_m = [
-        builder.around.path_room(
-            np.array([above, ground_m - (0.0, 0.0, TAKE_OFF_HEIGHT_M)])
-        ).contact_m
+        builder.around.path_room(np.array([above, ground_m - up_m])).contact_m
         for above, ground_m in ((take_off_m, home_m), (above_m, landing_m))
     ]
     if min(track.room.contact_m, *ups_m) <= 0.0:
@@ -222,6 +207,17 @@ def make_track(
             f"make it smaller"
         )
     return track
+
+
+def _check_in_air(flight: Flight, uas: int, sortie: Sortie, path: FloatArray, first: int) -> None:
+    """Refuse a flight made of a log, which does not say that a UAS had landed in between."""
+    touches = first + np.flatnonzero(-path[:, 2] < _GROUND_M)
+    if len(touches):
+        at_s = (sortie.first + int(touches[0])) * flight.scenario.dt_s
+        raise InputError(
+            f"{flight.scenario.uas[uas].name} is on the ground {at_s:g} s after the start and "
+            f"flies on; export the flight that was planned instead"
+        )
 
 
 def _place_m(flight: Flight, uas: int, sample: int) -> FloatArray:
@@ -303,6 +299,19 @@ class _Builder:
         self._covered: dict[int, list[int]] = {}
         for w, sample in covered.items():
             self._covered.setdefault(sample, []).append(w)
+
+    def corners(
+        self, first: int, last: int, take_off_m: FloatArray, above_m: FloatArray
+    ) -> list[tuple[FloatArray, int]]:
+        """Corners from above the take-off place to above that of landing, each with its sample."""
+        points = [(take_off_m, first), (self.path[first], first), *self.legs(first, last)]
+        if self._rests_between:
+            points = self.sharpened(points)
+        if np.linalg.norm(points[0][0] - points[1][0]) <= 0.1:
+            del points[1]
+        if len(points) == 1 or np.linalg.norm(points[-1][0] - above_m) > 0.1:
+            points.append((above_m, last))
+        return points
 
     def legs(self, first: int, last: int) -> list[tuple[FloatArray, int]]:
         """Ends of legs from one sample to another, each with its sample."""
