@@ -1,7 +1,8 @@
 // The curves beside a flight. Two flights share their ranges, so that they can be compared.
 
 import { Chart, DASHES, type ChartContent, type Line, type TimeCanvas } from "./chart";
-import type { Flight, Series } from "./flight";
+import type { Flight } from "./flight";
+import type { Series } from "./flight_data";
 import { shortName } from "./marks";
 import { ModeChart } from "./mode_chart";
 

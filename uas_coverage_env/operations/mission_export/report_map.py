@@ -4,12 +4,11 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
-import shapely
-
+from uas_coverage_env.draw.colours import UAS
 from uas_coverage_env.draw.labels import short_name
 from uas_coverage_env.draw.terrain import scale_step_m
 from uas_coverage_env.flight.seen import SEARCH_AREA
-from uas_coverage_env.operations.convex import hull_of
+from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.operations.mission_export.formats.geofence import ZONES
 from uas_coverage_env.operations.mission_export.mission_file import Exported
 from uas_coverage_env.operations.mission_export.scheduling import Part
@@ -17,28 +16,15 @@ from uas_coverage_env.operations.mission_export.tracks import FloatArray
 from uas_coverage_env.scenario import Decoration, Obstacle
 
 # custom properties of the page's style, so that it can be light or dark
-_INK, _AREA, _FENCE, _WAYPOINT = "var(--ink)", "var(--area)", "var(--fence)", "var(--waypoint)"
-_OBSTACLE, _NO_FLY, _BAD = "var(--obstacle)", "var(--no-fly)", "var(--bad)"
+_INK, _AREA, _FENCE, _WAYPOINT = "var(--ink)", "var(--panel)", "var(--fence)", "var(--covered)"
+_OBSTACLE, _NO_FLY, _BAD = "var(--obstacle)", "var(--no-fly)", "var(--discharged)"
 _SEARCH, _STREET = "var(--search)", "var(--street)"
-_OF_UAS_LIGHT = ("#0072b2", "#d55e00", "#aa4b8c", "#009e73", "#e69f00", "#56b4e9", "#26282c")
-_OF_UAS_DARK = ("#4d9cc9", "#e28e4d", "#c481ae", "#4dbb9d", "#eebc4d", "#89cbf0", "#b2b3b4")
 _FILLS = {
     _SEARCH: "area to search",
     _STREET: "street",
     _OBSTACLE: "obstacle",
     _NO_FLY: "no-fly zone",
 }
-
-
-def _of_uas(colours: Sequence[str]) -> str:
-    return "".join(f"--uas-{n}:{colour};" for n, colour in enumerate(colours))
-
-
-LIGHT = f"""--area:#fff;--fence:#888;--obstacle:#bbb8b0;--no-fly:#d9a29c;--search:#f3eedd;
---street:#e3e3e0;--waypoint:#70be86;{_of_uas(_OF_UAS_LIGHT)}"""
-DARK = f"""--area:#262b2b;--fence:#c9ccc8;--obstacle:#5d5f5f;--no-fly:#7d4440;--search:#353224;
---street:#343a3b;--waypoint:#70be86;{_of_uas(_OF_UAS_DARK)}"""
-"""Colours of the map, on light and on dark pages; `--ink` and `--bad` are the page's."""
 
 
 def map_of(parts: Sequence[Part]) -> str:
@@ -150,7 +136,7 @@ def _filled(colour: str) -> str:
 
 def _colour(n: int) -> str:
     """That of the n-th UAS."""
-    return f"var(--uas-{n % len(_OF_UAS_LIGHT)})"
+    return f"var(--uas-{n % len(UAS)})"
 
 
 def _fill_of(drawn: Decoration | Obstacle) -> str:
@@ -162,8 +148,7 @@ def _fill_of(drawn: Decoration | Obstacle) -> str:
 
 
 def _outline(vertices_m: Any, style: str, name: str = "") -> str:
-    ring = hull_of(shapely.MultiPoint(vertices_m[:, :2])).exterior.coords[:-1]
-    return _polygon([(-north, east) for north, east in ring], style, name)
+    return _polygon([(-north, east) for north, east in outline_of(vertices_m)], style, name)
 
 
 def _polygon(corners: Sequence[tuple[float, float]], style: str, name: str) -> str:

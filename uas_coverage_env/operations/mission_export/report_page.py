@@ -4,29 +4,28 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from uas_coverage_env.draw.colours import page_style
 from uas_coverage_env.operations.mission_export.failure_responses import FAILURES
-from uas_coverage_env.operations.mission_export.report_map import DARK, LIGHT, key_of, map_of
+from uas_coverage_env.operations.mission_export.report_map import key_of, map_of
 from uas_coverage_env.operations.mission_export.scheduling import Part
 
-_STYLE = f"""
-:root{{color-scheme:light dark;--paper:#fff;--ink:#26282c;--edge:#ddd;--outside:#eaebe0;
---bad:#c81e2d;{LIGHT}}}
-@media screen and (prefers-color-scheme:dark){{:root{{--paper:#131618;--ink:#e9e9e4;--edge:#363c3f;
---outside:#181c1d;--bad:#ff5a5f;{DARK}}}}}
-body{{font:15px system-ui,sans-serif;max-width:80rem;margin:2rem auto;padding:0 1rem;
-color:var(--ink);background:var(--paper)}}
-table{{border-collapse:collapse;margin:1rem 0}}
-th,td{{padding:.2rem .7rem;text-align:right;border-bottom:1px solid var(--edge)}}
-th:first-child,td:first-child{{text-align:left}}
-td{{white-space:nowrap}}
-svg{{width:100%;max-width:48rem;max-height:80vh;background:var(--outside)}}
-svg text{{font-weight:600;paint-order:stroke;stroke:var(--area);fill:var(--ink)}}
-.wide{{overflow-x:auto}}
-.key span{{display:inline-block;margin-right:1rem}}
-.key i{{display:inline-block;width:.8em;height:.8em;margin-right:.3em}}
-.bad{{color:var(--bad);font-weight:600}}
-summary{{cursor:pointer}}
+_STYLE = (
+    page_style()
+    + """body{font:15px system-ui,sans-serif;max-width:80rem;margin:2rem auto;padding:0 1rem;
+color:var(--ink);background:var(--paper)}
+table{border-collapse:collapse;margin:1rem 0}
+th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid var(--edge)}
+th:first-child,td:first-child{text-align:left}
+td{white-space:nowrap}
+svg{width:100%;max-width:48rem;max-height:80vh;background:var(--outside)}
+svg text{font-weight:600;paint-order:stroke;stroke:var(--panel);fill:var(--ink)}
+.wide{overflow-x:auto}
+.key span{display:inline-block;margin-right:1rem}
+.key i{display:inline-block;width:.8em;height:.8em;margin-right:.3em}
+.bad{color:var(--discharged);font-weight:600}
+summary{cursor:pointer}
 """
+)
 _NOTE = (
     "Times, charges and delays are those of a model of how ArduCopter flies the files, in still "
     "air unless the page says otherwise; they differ from the planned flight. Charge is counted as "

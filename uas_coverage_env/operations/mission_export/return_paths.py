@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.operations.clearance import Surroundings
 from uas_coverage_env.operations.mission_export.tracks import Track
 from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M
@@ -220,7 +221,7 @@ class _Paths:
         fans = shapely.convex_hull(shapely.multipoints(corners)) if len(corners) else []
         swept = shapely.union_all([*fans, shapely.LineString([stops_m[-1], home_m])])
         swept = shapely.buffer(swept, self._radius_m + _OFF_WAY_M)
-        prints = [shapely.MultiPoint(h.vertices_m[:, :2]).convex_hull for h in self._scenario.hulls]
+        prints = [shapely.Polygon(outline_of(h.vertices_m)) for h in self._scenario.hulls]
         return np.asarray(shapely.intersects(swept, prints), bool).reshape(len(prints))
 
     def _corners_m(self, k: int, height_m: float) -> tuple[FloatArray, FloatArray]:

@@ -1,9 +1,8 @@
 """The fence that a vehicle is told: where to stay, and the zones to stay out of."""
 
 import numpy as np
-import shapely
 
-from uas_coverage_env.operations.convex import hull_of
+from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.operations.mission_export.mission_file import Exported
 from uas_coverage_env.scenario import Scenario
 
@@ -31,8 +30,7 @@ def polygons_of(scenario: Scenario, one: Exported) -> list[tuple[list[list[float
     ]
     found = []
     for vertices_m, inside in bodies:
-        ring = hull_of(shapely.MultiPoint(vertices_m[:, :2])).exterior.coords[:-1]
-        places = one.geodetic([(*corner, 0.0) for corner in ring])
+        places = one.geodetic([(*corner, 0.0) for corner in outline_of(vertices_m)])
         found.append((np.round(places[:, :2], 8).tolist(), inside))
     return found
 
