@@ -113,6 +113,11 @@ def hex_of(colour: Colour) -> str:
     return "#" + "".join(f"{part:02x}" for part in colour)
 
 
+def _on_both(**colours: Colour) -> dict[str, tuple[Colour, Colour]]:
+    """Properties that are the same on light and dark pages."""
+    return {name.replace("_", "-"): (colour, colour) for name, colour in colours.items()}
+
+
 PAGES: dict[str, tuple[Colour, Colour]] = {
     "paper": (PAPER, (19, 22, 24)),
     "panel": (WHITE, (27, 31, 33)),
@@ -131,10 +136,23 @@ PAGES: dict[str, tuple[Colour, Colour]] = {
     "charged": (GREEN, (32, 196, 148)),
     "half": ((232, 192, 32), (240, 208, 64)),
     "discharged": (RED, (255, 90, 95)),
-    "covering": (MODES["covering"], MODES["covering"]),
-    "transit": (MODES["transit"], MODES["transit"]),
-    "return": (MODES["return"], MODES["return"]),
     "landed": (MODES["landed"], (139, 143, 143)),
+    **_on_both(
+        covering=MODES["covering"],
+        transit=MODES["transit"],
+        returning=MODES["return"],
+        alert=RED,
+        button=BLUE,
+        breach=(224, 123, 0),
+        fallback=PURPLE,
+        progress=GREEN,
+        effort=PURPLE,
+        near_obstacles=(140, 86, 75),
+        near_moving=RED,
+        near_others=BLUE,
+        near_fence=(127, 127, 127),
+        near_height=(184, 134, 11),
+    ),
     **{
         name: (tint, on_dark_area(tint))
         for name, tint in (

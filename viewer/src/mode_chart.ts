@@ -15,7 +15,7 @@ const MANY = 8;
 const PAINT: Record<string, [string, string]> = {
   covering: ["--covering", "#ffffff"],
   transit: ["--transit", "#1b1b1b"],
-  return: ["--return", "#1b1b1b"],
+  return: ["--returning", "#1b1b1b"],
   landed: ["--landed", "#1b1b1b"],
   lost: ["--discharged", "#ffffff"],
 };
