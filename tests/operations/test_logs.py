@@ -24,8 +24,8 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import accomplished, covered_at, rest_of
 from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.operations import LocalFrame, flown_flight, read_log
+from uas_coverage_env.operations.logs.flown_path import AT_HOME_M
 from uas_coverage_env.operations.logs.logged import Logged
-from uas_coverage_env.operations.logs.trajectory import AT_HOME_M
 from uas_coverage_env.scenario import Place, Scenario, load_scenario
 
 HERE = ("--place", "47.5,19.05")

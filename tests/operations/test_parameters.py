@@ -15,10 +15,11 @@ from test_when_something_fails import BEYOND, HERE, SCHOOL, flown
 
 from uas_coverage_env import rollout
 from uas_coverage_env.cli import main
-from uas_coverage_env.operations import FIRMWARES, ExportOptions, LocalFrame, make_export
+from uas_coverage_env.operations import ExportOptions, LocalFrame, make_export
 from uas_coverage_env.operations.mission_export.formats.parameters import (
     COPTER_46,
     COPTER_47,
+    FIRMWARES,
     PARAMETERS,
     PX4,
 )

@@ -17,7 +17,7 @@ from uas_coverage_env.operations.area_import.drawn_areas import (
     drawn_of,
 )
 from uas_coverage_env.operations.area_import.feature_roles import ROLES, UNSAID
-from uas_coverage_env.operations.area_import.geo_features import Feature, attributes_of
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature, attributes_of
 from uas_coverage_env.operations.area_import.length_texts import length_m
 from uas_coverage_env.operations.area_import.osm_tags import (
     LEAST_M,
@@ -41,7 +41,7 @@ CLOSED = {"type": "LineString", "coordinates": RING}
 
 def made(geometry, attributes):
     """What a feature becomes: the words of the table, or `refused`."""
-    thing = Feature("f", "one", geometry, attributes_of(attributes))
+    thing = GeoFeature("f", "one", geometry, attributes_of(attributes))
     try:
         (one,) = drawn_of(thing)
     except InputError as error:
@@ -198,5 +198,5 @@ def test_a_height_that_cannot_be_read_is_counted():
 
 def test_a_take_off_place_may_be_drawn_as_several_points():
     many = {"type": "MultiPoint", "coordinates": RING[:2]}
-    places = list(drawn_of(Feature("f", "one", many, {"role": "home"})))
+    places = list(drawn_of(GeoFeature("f", "one", many, {"role": "home"})))
     assert [type(place) for place in places] == [TakeOff, TakeOff]

@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Room:
+class Clearance:
     """What is left on a line.
 
     Attributes:
@@ -24,9 +24,9 @@ class Room:
     spare_m: float
     contact_m: float
 
-    def least(self, other: "Room") -> "Room":
+    def least(self, other: "Clearance") -> "Clearance":
         """The smaller of two."""
-        return Room(min(self.spare_m, other.spare_m), min(self.contact_m, other.contact_m))
+        return Clearance(min(self.spare_m, other.spare_m), min(self.contact_m, other.contact_m))
 
 
 class Surroundings:
@@ -45,7 +45,7 @@ class Surroundings:
         self._low = np.array([h.vertices_m.min(axis=0) for h in self._hulls]).reshape(-1, 3)
         self._high = np.array([h.vertices_m.max(axis=0) for h in self._hulls]).reshape(-1, 3)
 
-    def room(self, start_m: FloatArray, end_m: FloatArray, most_m: float = 10.0) -> Room:
+    def room(self, start_m: FloatArray, end_m: FloatArray, most_m: float = 10.0) -> Clearance:
         """Room on a straight line.
 
         Args:
@@ -55,7 +55,7 @@ class Surroundings:
         """
         # signed distance is convex: in a convex fence it is largest at an end
         inside_m = -float(self._fence.signed_distance([start_m, end_m]).max())
-        room = Room(min(inside_m - self._margin_m, most_m), min(inside_m, most_m))
+        room = Clearance(min(inside_m - self._margin_m, most_m), min(inside_m, most_m))
         reach_m = (self._safe_m + self._radius_m + most_m)[:, None]
         beside = np.minimum(start_m, end_m) > self._high + reach_m
         beside |= np.maximum(start_m, end_m) < self._low - reach_m
@@ -65,10 +65,10 @@ class Surroundings:
                 hull.normals, hull.offsets_m, 0, hull.n_faces, *start_m, *end_m
             )
             contact_m = float(clear_m) - self._radius_m
-            room = room.least(Room(contact_m - float(self._safe_m[o]), contact_m))
+            room = room.least(Clearance(contact_m - float(self._safe_m[o]), contact_m))
         return room
 
-    def path_room(self, places_m: FloatArray) -> Room:
+    def path_room(self, places_m: FloatArray) -> Clearance:
         """Room on a path.
 
         Args:

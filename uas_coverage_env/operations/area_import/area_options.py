@@ -11,7 +11,7 @@ from uas_coverage_env.files.errors import InputError
 _MOST_TIMES, _LONGEST_MIN = 100, 1440.0
 
 
-class Wishes(NamedTuple):
+class AreaOptions(NamedTuple):
     """What a drawing asks of an area; None: as for all.
 
     Attributes:
@@ -29,7 +29,7 @@ class Wishes(NamedTuple):
     again_after_s: tuple[float, ...] | None = None
 
 
-NOTHING = Wishes()
+NO_OPTIONS = AreaOptions()
 
 _BOUNDS = {
     "height_m": (1.0, 1_000.0),
@@ -42,7 +42,7 @@ NAMES = (*_BOUNDS, "again_min")
 """The attributes of a drawing that say it; short enough for the table of a shapefile."""
 
 
-def wishes_of(source: str, attributes: Mapping[str, Any]) -> Wishes:
+def area_options_of(source: str, attributes: Mapping[str, Any]) -> AreaOptions:
     """What the attributes of a drawing ask for.
 
     Args:
@@ -61,7 +61,7 @@ def wishes_of(source: str, attributes: Mapping[str, Any]) -> Wishes:
     if "height_m" in numbers and "pixel_cm" in numbers:
         raise InputError(f"{source}: pixel_cm says how high waypoints lie; leave out height_m")
     again = minutes_of(f"{source}: again_min", given["again_min"]) if "again_min" in given else None
-    return Wishes(**numbers, again_after_s=again)
+    return AreaOptions(**numbers, again_after_s=again)
 
 
 def minutes_of(source: str, given: Any) -> tuple[float, ...]:

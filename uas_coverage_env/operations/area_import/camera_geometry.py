@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.area_options import Wishes
+from uas_coverage_env.operations.area_import.area_options import AreaOptions
 from uas_coverage_env.operations.area_import.cameras import Camera, named_camera
 
 _UNEVEN_M = 1.0
@@ -15,7 +15,7 @@ _UNEVEN_M = 1.0
 
 
 @dataclass(frozen=True)
-class Look:
+class CameraView:
     """How a camera looks at the ground.
 
     Attributes:
@@ -57,9 +57,9 @@ class Look:
         return line
 
 
-def look_of(
+def view_of(
     name_or_path: str, height_m: float, resolution_cm: float | None, radius_m: float, overlap: float
-) -> Look:
+) -> CameraView:
     """How a camera looks at the ground.
 
     Args:
@@ -75,38 +75,40 @@ def look_of(
     name, camera = named_camera(name_or_path)
     if resolution_cm is not None:
         height_m = camera.height_m(resolution_cm, radius_m)
-    return Look(name, camera, height_m, camera.pitch_m(height_m, radius_m, overlap))
+    return CameraView(name, camera, height_m, camera.pitch_m(height_m, radius_m, overlap))
 
 
-def look_as_wished(look: Look, wishes: Wishes, radius_m: float, overlap: float) -> Look:
+def view_with(
+    view: CameraView, options: AreaOptions, radius_m: float, overlap: float
+) -> CameraView:
     """The look at an area whose drawing says how.
 
     Args:
-        look: As at all areas.
-        wishes: What the drawing says.
+        view: As at all areas.
+        options: What the drawing says.
         radius_m: Of a waypoint's sphere [m].
         overlap: As in all areas [-].
 
     Raises:
         InputError: It cannot be looked at so.
     """
-    height_m = look.height_m if wishes.height_m is None else wishes.height_m
-    if wishes.pixel_cm is not None:
-        height_m = look.camera.height_m(wishes.pixel_cm, radius_m)
-    share = overlap if wishes.overlap is None else wishes.overlap
-    return replace(look, height_m=height_m, pitch_m=look.camera.pitch_m(height_m, radius_m, share))
+    height_m = view.height_m if options.height_m is None else options.height_m
+    if options.pixel_cm is not None:
+        height_m = view.camera.height_m(options.pixel_cm, radius_m)
+    share = overlap if options.overlap is None else options.overlap
+    return replace(view, height_m=height_m, pitch_m=view.camera.pitch_m(height_m, radius_m, share))
 
 
-def look_at(looks: Sequence[Look], camera: str | None, source: str) -> Look:
+def view_by(views: Sequence[CameraView], camera: str | None, source: str) -> CameraView:
     """The look at an area; the first is the usual one.
 
     Raises:
         InputError: No UAS carries the camera that the area names.
     """
-    for look in looks:
-        if camera in (None, look.name):
-            return look
-    carried = ", ".join(look.name for look in looks)
+    for view in views:
+        if camera in (None, view.name):
+            return view
+    carried = ", ".join(view.name for view in views)
     raise InputError(
         f"{source} is to be seen by {camera!r}, which no UAS carries (they carry {carried}); give "
         f"one of them the camera, --fleet VEHICLE+{camera}:1"

@@ -12,10 +12,15 @@ from shapely.geometry import Polygon
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_bytes
-from uas_coverage_env.operations.area_import.area_options import NAMES, NOTHING, Wishes, wishes_of
+from uas_coverage_env.operations.area_import.area_options import (
+    NAMES,
+    NO_OPTIONS,
+    AreaOptions,
+    area_options_of,
+)
 from uas_coverage_env.operations.area_import.buffers import Rings, circle, strip
 from uas_coverage_env.operations.area_import.feature_roles import ROLES, Meaning, meaning_of
-from uas_coverage_env.operations.area_import.geo_features import Feature, Part, parts_of
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature, Part, parts_of
 from uas_coverage_env.operations.area_import.length_texts import length_m, length_with_unit_m
 from uas_coverage_env.operations.area_import.osm_tags import LEAST_M, OTHER, half_width_m, height_m
 
@@ -51,7 +56,7 @@ class DrawnPolygon:
         outer: (N, 2) latitude and longitude of the corners [degrees].
         holes: The same of each hole.
         camera: Name of the one that is to see it; None: the usual one.
-        wishes: How it is to be looked at.
+        options: How it is to be looked at.
         solid: What stands on it, where it is an obstacle.
         together: Fences with the same one are one, of several parts.
     """
@@ -63,7 +68,7 @@ class DrawnPolygon:
     outer: NDArray[np.float64]
     holes: tuple[NDArray[np.float64], ...] = ()
     camera: str | None = None
-    wishes: Wishes = NOTHING
+    options: AreaOptions = NO_OPTIONS
     solid: Solid | None = None
     together: str = ""
 
@@ -114,7 +119,7 @@ class Remark(NamedTuple):
 Drawn = DrawnPolygon | TakeOff | LeftOut | Remark
 
 
-def drawn_of(feature: Feature, *, on_map: bool = False) -> Iterator[Drawn]:
+def drawn_of(feature: GeoFeature, *, on_map: bool = False) -> Iterator[Drawn]:
     """What a feature becomes, by the table of roles.
 
     Args:
@@ -171,7 +176,7 @@ def limited(source: str, things: Iterable[Drawn]) -> Iterator[Drawn]:
         yield thing
 
 
-def _area(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
+def _area(feature: GeoFeature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     source, name = _named(feature)
     outer, holes = _rings(source, part)
     weight = _weight(source, feature.attributes.get("weight"))
@@ -183,18 +188,18 @@ def _area(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
         outer,
         holes,
         _camera(feature),
-        wishes_of(source, feature.attributes),
+        area_options_of(source, feature.attributes),
     )
 
 
-def _zone(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
+def _zone(feature: GeoFeature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     source, name = _named(feature)
     _check_not_seen(source, feature)
     outer, holes = _rings(source, part)
     yield DrawnPolygon(source, name, "no_fly", 1.0, outer, holes)
 
 
-def _fence(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
+def _fence(feature: GeoFeature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     source, name = _named(feature)
     _check_not_seen(source, feature)
     outer, holes = _rings(source, part)
@@ -202,7 +207,7 @@ def _fence(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     yield DrawnPolygon(source, name, "fence", 1.0, outer, holes, together=together)
 
 
-def _obstacle(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
+def _obstacle(feature: GeoFeature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     source, name = _named(feature)
     what = meaning.solid or OTHER
     _check_not_seen(source, feature, but="height_m")
@@ -248,14 +253,14 @@ def _obstacle(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]
         yield DrawnPolygon(source, name, "obstacle", 1.0, outer, holes, solid=solid)
 
 
-def _take_off(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
+def _take_off(feature: GeoFeature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     latitude, longitude = _degrees(feature.source, part.positions)[0].tolist()
     source = feature.source if feature.name else feature.file
     said = meaning.role == "home"
     yield TakeOff(source, latitude, longitude, feature.ground_m, feature.name, said)
 
 
-def _left_out(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
+def _left_out(feature: GeoFeature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     if part.shape != "nothing":
         what = {"closed line": "line"}.get(part.shape, part.shape)
     else:
@@ -263,7 +268,7 @@ def _left_out(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]
     yield LeftOut(what, feature.name)
 
 
-def _refused(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
+def _refused(feature: GeoFeature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
     source, said = feature.source, f"{meaning.said_by} says {meaning.role}"
     if meaning.role == "home":
         raise InputError(f"{source}: {said}, but it is a {part.kind}; draw a point")
@@ -280,7 +285,7 @@ def _refused(feature: Feature, part: Part, meaning: Meaning) -> Iterator[Drawn]:
         yield from becomes(feature, part._replace(shape="polygon", positions=turned), meaning)
 
 
-def _outlines(feature: Feature, part: Part, *, around: bool) -> list[Rings]:
+def _outlines(feature: GeoFeature, part: Part, *, around: bool) -> list[Rings]:
     """Outlines of a point with a radius, or of a line with a width; none, where it has none."""
     point = part.shape == "point"
     keys = ("radius_m", "radius") if point else ("width_m", "width")
@@ -296,7 +301,7 @@ def _outlines(feature: Feature, part: Part, *, around: bool) -> list[Rings]:
     return strip(places, 0.5 * size_m, beyond=around)
 
 
-_MAKE: Mapping[str, Callable[[Feature, Part, Meaning], Iterator[Drawn]]] = {
+_MAKE: Mapping[str, Callable[[GeoFeature, Part, Meaning], Iterator[Drawn]]] = {
     "area": _area,
     "zone": _zone,
     "fence": _fence,
@@ -307,7 +312,7 @@ _MAKE: Mapping[str, Callable[[Feature, Part, Meaning], Iterator[Drawn]]] = {
 }
 
 
-def _named(feature: Feature) -> tuple[str, str]:
+def _named(feature: GeoFeature) -> tuple[str, str]:
     """File and name for messages, and the name."""
     name = feature.name or feature.fallback or feature.place
     return f"{feature.file}: {name!r}", name
@@ -322,12 +327,12 @@ def _rings(source: str, part: Part) -> tuple[NDArray[np.float64], tuple[NDArray[
     return outer, tuple(holes)
 
 
-def _camera(feature: Feature) -> str | None:
+def _camera(feature: GeoFeature) -> str | None:
     given = feature.attributes.get("camera")
     return str(given).strip()[:80] or None if given is not None else None
 
 
-def _check_not_seen(source: str, feature: Feature, but: str = "") -> None:
+def _check_not_seen(source: str, feature: GeoFeature, but: str = "") -> None:
     """What is no area to be seen asks for nothing of the kind."""
     camera = _camera(feature)
     if camera:

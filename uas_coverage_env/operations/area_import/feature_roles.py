@@ -12,7 +12,7 @@ from itertools import chain
 from typing import Literal, NamedTuple
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.geo_features import Feature, Shape
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature, Shape
 from uas_coverage_env.operations.area_import.length_texts import length_m
 from uas_coverage_env.operations.area_import.osm_tags import (
     BUILDING,
@@ -195,7 +195,7 @@ class Meaning(NamedTuple):
     against: str = ""
 
 
-def meaning_of(feature: Feature, shape: Shape, *, on_map: bool = False) -> Meaning:
+def meaning_of(feature: GeoFeature, shape: Shape, *, on_map: bool = False) -> Meaning:
     """What a feature means.
 
     Args:
@@ -225,7 +225,7 @@ def meaning_of(feature: Feature, shape: Shape, *, on_map: bool = False) -> Meani
     return found
 
 
-def _told(feature: Feature, shape: Shape, *, on_map: bool) -> Meaning | None:
+def _told(feature: GeoFeature, shape: Shape, *, on_map: bool) -> Meaning | None:
     """What name, kind, height and folders say; None: nothing."""
     names, kinds = _texts(feature, NAMES), _texts(feature, KINDS)
     if on_map:
@@ -254,7 +254,7 @@ def _told(feature: Feature, shape: Shape, *, on_map: bool) -> Meaning | None:
     return None if within is None or within.role == "search" else within
 
 
-def _plainly(feature: Feature, shape: Shape) -> Meaning | None:
+def _plainly(feature: GeoFeature, shape: Shape) -> Meaning | None:
     """What any attribute says that is nothing but no-fly: `remark = "NFZ"`, `no_fly = true`."""
     for key, value in feature.attributes.items():
         words = _ALONE["no_fly"] if key == "description" else _FLYING
@@ -266,7 +266,13 @@ def _plainly(feature: Feature, shape: Shape) -> Meaning | None:
 
 
 def _worded(
-    feature: Feature, text: str, shape: Shape, where: str, *, only: bool = True, sure: bool = False
+    feature: GeoFeature,
+    text: str,
+    shape: Shape,
+    where: str,
+    *,
+    only: bool = True,
+    sure: bool = False,
 ) -> Meaning | None:
     """What the words of a name or folder say; only: several that contradict each other may not."""
     plain = _plain(text)
@@ -305,7 +311,7 @@ def _layer(text: str, shape: Shape) -> Meaning | None:
     return None
 
 
-def _standing(feature: Feature, shape: Shape) -> Meaning | None:
+def _standing(feature: GeoFeature, shape: Shape) -> Meaning | None:
     """What tags of a kind or a height say."""
     tags = {k: v for k, v in feature.attributes.items() if k != "height_m"}
     solid = standing_of(tags)
@@ -322,7 +328,7 @@ def speaks_of_flying(text: str) -> bool:
     return bool(_FLIGHT.search(_plain(text)))
 
 
-def _given(feature: Feature, text: str) -> tuple[Role, Tagged | None]:
+def _given(feature: GeoFeature, text: str) -> tuple[Role, Tagged | None]:
     """The role that an attribute gives, and what stands there."""
     known = _known(text)
     if known is None:
@@ -342,7 +348,7 @@ def _known(text: str) -> tuple[Role, Tagged | None] | None:
     return ("obstacle", solid) if solid is not None and not found else None
 
 
-def _texts(feature: Feature, keys: tuple[str, ...]) -> list[str]:
+def _texts(feature: GeoFeature, keys: tuple[str, ...]) -> list[str]:
     return [str(feature.attributes[key]) for key in keys if key in feature.attributes]
 
 

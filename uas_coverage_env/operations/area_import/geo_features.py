@@ -19,7 +19,7 @@ _METRES_PER_DEGREE = 111_320.0
 
 
 @dataclass(frozen=True)
-class Feature:
+class GeoFeature:
     """A thing in a file.
 
     Attributes:
@@ -89,7 +89,7 @@ def attributes_of(*tables: Any) -> dict[str, Any]:
     return found
 
 
-def parts_of(feature: Feature) -> Iterator[Part]:
+def parts_of(feature: GeoFeature) -> Iterator[Part]:
     """The simple geometries of a feature; one of `nothing` where it has no place.
 
     Raises:
@@ -99,7 +99,7 @@ def parts_of(feature: Feature) -> Iterator[Part]:
     yield from found or [Part("nothing", (), feature.what or "empty geometry")]
 
 
-def _parts(feature: Feature, geometry: Any, depth: int) -> Iterator[Part]:
+def _parts(feature: GeoFeature, geometry: Any, depth: int) -> Iterator[Part]:
     if geometry is None or geometry == {}:
         return
     if not isinstance(geometry, Mapping) or depth > _DEEPEST:
@@ -139,7 +139,7 @@ _SIMPLE: Mapping[str, tuple[Shape, bool]] = {
 GEOMETRIES = (*_SIMPLE, "GeometryCollection")
 
 
-def _list(feature: Feature, given: Any, what: str) -> list[Any]:
+def _list(feature: GeoFeature, given: Any, what: str) -> list[Any]:
     if given is None:
         return []
     if not isinstance(given, list | tuple):

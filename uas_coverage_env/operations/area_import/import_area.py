@@ -14,34 +14,38 @@ from uas_coverage_env.files.errors import InputError, check_within
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight.seen import SEARCH_AREA
-from uas_coverage_env.operations.area_import.area_options import NOTHING
+from uas_coverage_env.operations.area_import.area_options import NO_OPTIONS
 from uas_coverage_env.operations.area_import.camera_geometry import (
-    Look,
-    look_as_wished,
-    look_at,
-    look_of,
+    CameraView,
+    view_by,
+    view_of,
+    view_with,
 )
 from uas_coverage_env.operations.area_import.cameras import named_camera
 from uas_coverage_env.operations.area_import.drawn_areas import Drawn, DrawnPolygon
 from uas_coverage_env.operations.area_import.fleet import SPARE_M, Member, fleet_tables, parse_fleet
 from uas_coverage_env.operations.area_import.import_notes import (
     drawn_notes,
-    look_notes,
     standing_notes,
+    view_notes,
 )
 from uas_coverage_env.operations.area_import.prisms import Standing
 from uas_coverage_env.operations.area_import.relief import Relief, relief_of
 from uas_coverage_env.operations.area_import.site import (
     FENCE_MARGIN_M,
     Area,
-    Site,
+    MissionSite,
     Wall,
     make_site,
     town_walls,
     zone_walls,
 )
 from uas_coverage_env.operations.area_import.town_map import Town, read_town
-from uas_coverage_env.operations.area_import.waypoints import Asked, Waypoints, make_waypoints
+from uas_coverage_env.operations.area_import.waypoints import (
+    Requirements,
+    Waypoints,
+    make_waypoints,
+)
 from uas_coverage_env.operations.convex import polygons_of, without_holes
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.feasibility import back_and_forth
@@ -142,13 +146,13 @@ class _Mission:
     """All that a scenario is made of; attributes as the functions that make them say."""
 
     options: ImportOptions
-    site: Site
+    site: MissionSite
     relief: Relief
     town: Town
     walls: list[Wall]
     ceiling_m: float
     uas: list[dict[str, Any]]
-    seen: list[tuple[Area, Look]]
+    seen: list[tuple[Area, CameraView]]
     waypoints: Waypoints
     n_cameras: int
 
@@ -194,7 +198,7 @@ class _Mission:
         """Lines for the user."""
         site, walls, waypoints = self.site, self.walls, self.waypoints
         uneven = self.relief.ground is not None
-        yield from look_notes(self.seen, waypoints.above_m, uneven=uneven)
+        yield from view_notes(self.seen, waypoints.above_m, uneven=uneven)
         yield (
             f"fence of {site.fence.area / 1e4:.1f} ha, {self.ceiling_m:g} m high; {len(walls)} "
             f"obstacle{'' if len(walls) == 1 else 's'}"
@@ -223,10 +227,10 @@ class _Mission:
 def _mission(things: Sequence[Drawn], options: ImportOptions) -> _Mission:
     """What the scenario is made of."""
     fleet = parse_fleet(options.fleet)
-    looks = _looks(fleet, options)
-    highest_m = _highest_m(things, looks, options)
+    views = _views(fleet, options)
+    highest_m = _highest_m(things, views, options)
     site, relief = make_site(things, options.homes), Relief()
-    uas = _fleet_tables(fleet, looks, site, SPARE_M + (_FILES_OFF_M if options.flown_by else 0.0))
+    uas = _fleet_tables(fleet, views, site, SPARE_M + (_FILES_OFF_M if options.flown_by else 0.0))
     if options.terrain is not None:
         starts_m = np.array([table["start_m"][1::-1] for table in uas])
         relief = relief_of(options.terrain, site, starts_m)
@@ -242,20 +246,20 @@ def _mission(things: Sequence[Drawn], options: ImportOptions) -> _Mission:
         *town_walls(higher, site.fence),
     ]
     _check_starts(uas, walls, site)
-    seen = [(area, _look(looks, area, options)) for area in site.areas]
-    asks = len({look.name for _, look in seen}) > 1 or options.resolution_cm is not None
+    seen = [(area, _view(views, area, options)) for area in site.areas]
+    asks = len({view.name for _, view in seen}) > 1 or options.resolution_cm is not None
     speed_mps, again_after_s = options.max_speed_mps, options.again_after_s
-    asked = Asked(options.radius_m, speed_mps, options.min_height_m, asks, again_after_s)
+    asked = Requirements(options.radius_m, speed_mps, options.min_height_m, asks, again_after_s)
     waypoints = make_waypoints(site, relief, walls, seen, ceiling_m, asked)
-    return _Mission(options, site, relief, town, walls, ceiling_m, uas, seen, waypoints, len(looks))
+    return _Mission(options, site, relief, town, walls, ceiling_m, uas, seen, waypoints, len(views))
 
 
-def _looks(fleet: Sequence[Member], options: ImportOptions) -> tuple[Look, ...]:
+def _views(fleet: Sequence[Member], options: ImportOptions) -> tuple[CameraView, ...]:
     """How each camera of the fleet looks at the ground, the usual one first where it is carried."""
     how = options.height_m, options.resolution_cm, options.radius_m, options.overlap
     carried = dict.fromkeys(member.camera or options.camera for member in fleet)
     names = sorted(carried, key=lambda name: name != options.camera)
-    return tuple(look_of(name, *how) for name in names)
+    return tuple(view_of(name, *how) for name in names)
 
 
 def _raised(thing: Standing, relief: Relief) -> Standing:
@@ -264,21 +268,25 @@ def _raised(thing: Standing, relief: Relief) -> Standing:
     return replace(thing, height_m=thing.height_m + ground_m) if ground_m else thing
 
 
-def _look(looks: Sequence[Look], drawn: DrawnPolygon | Area, options: ImportOptions) -> Look:
+def _view(
+    views: Sequence[CameraView], drawn: DrawnPolygon | Area, options: ImportOptions
+) -> CameraView:
     """How an area is looked at."""
-    look = look_at(looks, drawn.camera, drawn.source)
-    if drawn.wishes[:-1] == NOTHING[:-1]:
-        return look
+    view = view_by(views, drawn.camera, drawn.source)
+    if drawn.options[:-1] == NO_OPTIONS[:-1]:
+        return view
     try:
-        return look_as_wished(look, drawn.wishes, options.radius_m, options.overlap)
+        return view_with(view, drawn.options, options.radius_m, options.overlap)
     except InputError as error:
         raise InputError(f"{drawn.source}: {error}") from error
 
 
-def _highest_m(things: Sequence[Drawn], looks: Sequence[Look], options: ImportOptions) -> float:
+def _highest_m(
+    things: Sequence[Drawn], views: Sequence[CameraView], options: ImportOptions
+) -> float:
     """Of the waypoints above the ground, roofs apart [m]."""
     areas = [t for t in things if isinstance(t, DrawnPolygon) and t.role == "search"]
-    return max(look.height_m for look in (*looks, *(_look(looks, t, options) for t in areas)))
+    return max(view.height_m for view in (*views, *(_view(views, t, options) for t in areas)))
 
 
 def _ceiling_m(highest_m: float, options: ImportOptions) -> float:
@@ -289,7 +297,7 @@ def _ceiling_m(highest_m: float, options: ImportOptions) -> float:
 
 
 def _fleet_tables(
-    fleet: Sequence[Member], looks: Sequence[Look], site: Site, spare_m: float
+    fleet: Sequence[Member], views: Sequence[CameraView], site: MissionSite, spare_m: float
 ) -> list[dict[str, Any]]:
     """The tables `[[uas]]`, each with its camera."""
     tables = fleet_tables(
@@ -297,11 +305,11 @@ def _fleet_tables(
     )
     for table, member in zip(tables, fleet, strict=True):
         name = named_camera(member.camera)[0] if member.camera else None
-        table["sensors"] = [look_at(looks, name, "--fleet").sensor()]
+        table["sensors"] = [view_by(views, name, "--fleet").sensor()]
     return tables
 
 
-def _check_starts(uas: Sequence[dict[str, Any]], walls: Sequence[Wall], site: Site) -> None:
+def _check_starts(uas: Sequence[dict[str, Any]], walls: Sequence[Wall], site: MissionSite) -> None:
     for table in uas:
         north_m, east_m, _ = table["start_m"]
         place = Point(east_m, north_m)
@@ -345,11 +353,11 @@ def _prism(footprint: Polygon, top_m: float) -> list[list[float]]:
     return [[*corner, down] for down in (0.0, -round(top_m, 3)) for corner in corners]
 
 
-def _decorations(seen: Sequence[tuple[Area, Look]], *, several: bool) -> list[dict[str, Any]]:
+def _decorations(seen: Sequence[tuple[Area, CameraView]], *, several: bool) -> list[dict[str, Any]]:
     """Outlines of the searched areas, to be drawn; where there are several cameras, of each."""
     parts = [
-        (f"{SEARCH_AREA}_{look.name}" if several else SEARCH_AREA, outline)
-        for area, look in seen
+        (f"{SEARCH_AREA}_{view.name}" if several else SEARCH_AREA, outline)
+        for area, view in seen
         for part in polygons_of(area.shape)
         for whole in polygons_of(part.simplify(_OUTLINE_DETAIL_M))
         for outline in without_holes(whole)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from itertools import takewhile
 
-from uas_coverage_env.operations.area_import.camera_geometry import Look
+from uas_coverage_env.operations.area_import.camera_geometry import CameraView
 from uas_coverage_env.operations.area_import.drawn_areas import (
     Drawn,
     DrawnPolygon,
@@ -20,7 +20,7 @@ from uas_coverage_env.operations.area_import.osm_tags import (
     STRUCTURE,
 )
 from uas_coverage_env.operations.area_import.prisms import Standing
-from uas_coverage_env.operations.area_import.site import Area, Site
+from uas_coverage_env.operations.area_import.site import Area, MissionSite
 from uas_coverage_env.operations.area_import.town_map import Town
 
 _STANDING = {
@@ -40,7 +40,9 @@ _MOST_NAMES = 3
 _SHORTEST = 3  # letters that names share, to be said once for all
 
 
-def drawn_notes(things: Sequence[Drawn], site: Site, uas: Sequence[str], town: Town) -> list[str]:
+def drawn_notes(
+    things: Sequence[Drawn], site: MissionSite, uas: Sequence[str], town: Town
+) -> list[str]:
     """Remarks on files, who takes off where, and what is left out.
 
     Args:
@@ -117,8 +119,8 @@ def _called(names: Sequence[str]) -> str:
     return f"{shown} …" if len(given) > _MOST_NAMES else shown
 
 
-def look_notes(
-    seen: Sequence[tuple[Area, Look]], above_m: Sequence[Sequence[float]], *, uneven: bool
+def view_notes(
+    seen: Sequence[tuple[Area, CameraView]], above_m: Sequence[Sequence[float]], *, uneven: bool
 ) -> list[str]:
     """What each camera sees, from how many waypoints.
 
@@ -128,17 +130,17 @@ def look_notes(
         uneven: Whether the ground is.
     """
     notes = []
-    looks = list(dict.fromkeys(look for _, look in seen))
-    for look in looks:
-        hectares = sum(area.shape.area for area, by in seen if by == look) / 1e4
+    views = list(dict.fromkeys(view for _, view in seen))
+    for view in views:
+        hectares = sum(area.shape.area for area, by in seen if by == view) / 1e4
         heights_m = [
             each_m
             for (_, by), heights_m in zip(seen, above_m, strict=True)
             for each_m in heights_m
-            if by == look
+            if by == view
         ]
-        named = f"{look.name}, {look.height_m:g} m: " if len(looks) > 1 else ""
-        notes.append(named + look.note(hectares, heights_m, uneven=uneven))
+        named = f"{view.name}, {view.height_m:g} m: " if len(views) > 1 else ""
+        notes.append(named + view.note(hectares, heights_m, uneven=uneven))
     return notes
 
 

@@ -10,7 +10,7 @@ from uas_coverage_env.operations.area_import.drawn_areas import (
     drawn_of,
     limited,
 )
-from uas_coverage_env.operations.area_import.geo_features import Feature
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature
 from uas_coverage_env.operations.area_import.readers.geojson import read_geojson
 from uas_coverage_env.operations.area_import.readers.kml import read_kml, read_kmz
 from uas_coverage_env.operations.area_import.readers.qgc_plan import read_plan
@@ -18,7 +18,7 @@ from uas_coverage_env.operations.area_import.readers.shapefile import read_shape
 
 _EXAMPLES = Path(__file__).with_name("examples")
 
-READERS: dict[str, Callable[[Path], Iterator[Feature]]] = {
+READERS: dict[str, Callable[[Path], Iterator[GeoFeature]]] = {
     ".geojson": read_geojson,
     ".json": read_geojson,
     ".kml": read_kml,

@@ -13,7 +13,12 @@ from shapely.geometry.base import BaseGeometry
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight.seen import TERRAIN
 from uas_coverage_env.operations.area_import.ground import FloatArray, Ground
-from uas_coverage_env.operations.area_import.site import LARGEST_UAS_M, SAFE_DISTANCE_M, Site, Wall
+from uas_coverage_env.operations.area_import.site import (
+    LARGEST_UAS_M,
+    SAFE_DISTANCE_M,
+    MissionSite,
+    Wall,
+)
 from uas_coverage_env.operations.area_import.terrain_obstacles import LOW_M, hills
 
 LEVEL_M = 2.0
@@ -47,7 +52,7 @@ class Relief:
         highest_m = max(0.0, *(self.range_m(*shape.bounds)[1] for shape in shapes))
         return math.ceil(10.0 * highest_m - 1e-6) / 10.0
 
-    def note(self, site: Site) -> str:
+    def note(self, site: MissionSite) -> str:
         """What the ground is like, for the user."""
         low_m, high_m = self.range_m(*site.fence.bounds)
         start_m = self.start_m or 0.0
@@ -60,7 +65,7 @@ class Relief:
         )
 
 
-def relief_of(path: Path, site: Site, starts_m: FloatArray) -> Relief:
+def relief_of(path: Path, site: MissionSite, starts_m: FloatArray) -> Relief:
     """The relief of a site from a grid of heights.
 
     Args:

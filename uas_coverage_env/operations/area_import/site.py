@@ -9,7 +9,7 @@ from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.area_options import NOTHING, Wishes
+from uas_coverage_env.operations.area_import.area_options import NO_OPTIONS, AreaOptions
 from uas_coverage_env.operations.area_import.drawn_areas import (
     Drawn,
     DrawnPolygon,
@@ -72,18 +72,18 @@ class Area(NamedTuple):
         shape: Polygons (x east, y north) [m].
         camera: Name of the one that is to see it; None: the usual one.
         source: File and name, for messages.
-        wishes: How it is to be looked at.
+        options: How it is to be looked at.
     """
 
     weight: float
     shape: BaseGeometry
     camera: str | None
     source: str
-    wishes: Wishes = NOTHING
+    options: AreaOptions = NO_OPTIONS
 
 
 @dataclass(frozen=True, eq=False)
-class Site:
+class MissionSite:
     """A site in local metres, x east, y north.
 
     Attributes:
@@ -111,7 +111,7 @@ class Site:
     notes: tuple[str, ...] = ()
 
 
-def make_site(things: Sequence[Drawn], homes: Sequence[tuple[float, float]]) -> Site:
+def make_site(things: Sequence[Drawn], homes: Sequence[tuple[float, float]]) -> MissionSite:
     """The site that was drawn.
 
     Args:
@@ -128,7 +128,11 @@ def make_site(things: Sequence[Drawn], homes: Sequence[tuple[float, float]]) -> 
     places = _take_off_places(things, homes, frame)
     homes_m = tuple(local_place(frame, place) for place in places)
     areas = _apart(
-        [Area(t.weight, a, t.camera, t.source, t.wishes) for t, a in polygons if t.role == "search"]
+        [
+            Area(t.weight, a, t.camera, t.source, t.options)
+            for t, a in polygons
+            if t.role == "search"
+        ]
     )
     drawn_fence, notes = _drawn_fence([(t, area) for t, area in polygons if t.role == "fence"])
     fence = _fence(drawn_fence, areas, homes_m)
@@ -141,7 +145,7 @@ def make_site(things: Sequence[Drawn], homes: Sequence[tuple[float, float]]) -> 
         for thing, area in polygons
         if thing.solid is not None
     ]
-    return Site(
+    return MissionSite(
         frame=frame,
         areas=areas,
         homes=places,
@@ -159,7 +163,7 @@ def make_site(things: Sequence[Drawn], homes: Sequence[tuple[float, float]]) -> 
     )
 
 
-def zone_walls(site: Site, more: Sequence[Polygon], ceiling_m: float) -> list[Wall]:
+def zone_walls(site: MissionSite, more: Sequence[Polygon], ceiling_m: float) -> list[Wall]:
     """Walls that reach beyond the ceiling: no-fly zones, and what is outside the drawn fence.
 
     Args:

@@ -20,7 +20,7 @@ from uas_coverage_env.operations.area_import.drawn_areas import (
     drawn_of,
 )
 from uas_coverage_env.operations.area_import.feature_roles import Meaning, meaning_of
-from uas_coverage_env.operations.area_import.geo_features import Feature, Part, Shape, parts_of
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature, Part, Shape, parts_of
 from uas_coverage_env.operations.area_import.local_polygons import local_polygon
 from uas_coverage_env.operations.area_import.osm_tags import (
     BUILDING,
@@ -113,7 +113,7 @@ def read_town(path: Path, frame: LocalFrame, area: Polygon) -> Town:
     return town
 
 
-def _read(path: Path) -> tuple[Iterable[Feature], str]:
+def _read(path: Path) -> tuple[Iterable[GeoFeature], str]:
     """Features with tags, and the attribution of the data."""
     if path.suffix.lower() in _OSM:
         # a library that nothing else needs
@@ -131,7 +131,7 @@ def _read(path: Path) -> tuple[Iterable[Feature], str]:
 
 
 def _add(
-    town: Town, feature: Feature, part: Part, meaning: Meaning, frame: LocalFrame, area: Polygon
+    town: Town, feature: GeoFeature, part: Part, meaning: Meaning, frame: LocalFrame, area: Polygon
 ) -> float:
     """Add what stands there; returns how far from the area it is [m]."""
     what = meaning.solid or OTHER
@@ -165,7 +165,7 @@ def _add(
 
 
 def _add_drawn(
-    town: Town, feature: Feature, meaning: Meaning, frame: LocalFrame, area: Polygon
+    town: Town, feature: GeoFeature, meaning: Meaning, frame: LocalFrame, area: Polygon
 ) -> None:
     """Add a no-fly zone, or what is to be passed over."""
     if meaning.role not in ("no_fly", "ignore"):
@@ -184,7 +184,9 @@ def _add_drawn(
                 town.no_fly.append(zone)
 
 
-def _add_other(town: Town, feature: Feature, part: Part, frame: LocalFrame, area: Polygon) -> None:
+def _add_other(
+    town: Town, feature: GeoFeature, part: Part, frame: LocalFrame, area: Polygon
+) -> None:
     """Add a street, or count what may be tall."""
     street_m = STREETS_M.get(str(feature.attributes.get("highway")))
     met = not_read(feature.attributes)
@@ -200,7 +202,7 @@ def _add_other(town: Town, feature: Feature, part: Part, frame: LocalFrame, area
         town.streets += _street(places, street_m or 0.0, area)
 
 
-def _local(feature: Feature, part: Part, frame: LocalFrame) -> np.ndarray | None:
+def _local(feature: GeoFeature, part: Part, frame: LocalFrame) -> np.ndarray | None:
     """(N, 2) east and north [m] of a part's places, or its outer ring; None where it has none."""
     given = part.positions[0] if part.shape == "polygon" else part.positions
     try:
@@ -216,7 +218,7 @@ def _local(feature: Feature, part: Part, frame: LocalFrame) -> np.ndarray | None
     return frame.to_ned(places[:, 1], places[:, 0])[:, 1::-1]
 
 
-def _ground(feature: Feature, shape: Shape, places: np.ndarray, what: Tagged) -> BaseGeometry:
+def _ground(feature: GeoFeature, shape: Shape, places: np.ndarray, what: Tagged) -> BaseGeometry:
     """What something stands on; of a line, a rectangle for each of its straight parts.
 
     Empty, where corners are missing, or where it is no outline although only that would tell.

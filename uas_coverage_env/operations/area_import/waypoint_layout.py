@@ -57,7 +57,7 @@ def lay_waypoints(
     for part in shapely.get_parts(area):
         if isinstance(part, Polygon) and part.area > _SLIVER_M2:
             for cell in _cells(part, pitch_m, label):
-                _look_at(part, cell, pitch_m, allowed, _DIVISIONS, layout)
+                _cover_cell(part, cell, pitch_m, allowed, _DIVISIONS, layout)
     return layout
 
 
@@ -82,7 +82,7 @@ def _cells(part: Polygon, pitch_m: tuple[float, float], label: str) -> Iterator[
     yield from cells[shapely.intersects(part, cells)]
 
 
-def _look_at(
+def _cover_cell(
     area: Polygon,
     cell: Polygon,
     pitch_m: tuple[float, float],
@@ -106,7 +106,7 @@ def _look_at(
         layout.places_m.append((x, y))
     elif divisions:
         for quarter in _quarters(west, south, east, north):
-            _look_at(area, quarter, pitch_m, allowed, divisions - 1, layout)
+            _cover_cell(area, quarter, pitch_m, allowed, divisions - 1, layout)
     else:
         layout.left_out_m2 += part.area
 

@@ -10,14 +10,14 @@ import shapely
 from shapely.geometry import Point
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.area_options import Wishes
-from uas_coverage_env.operations.area_import.camera_geometry import Look
+from uas_coverage_env.operations.area_import.area_options import AreaOptions
+from uas_coverage_env.operations.area_import.camera_geometry import CameraView
 from uas_coverage_env.operations.area_import.relief import Relief
 from uas_coverage_env.operations.area_import.site import (
     FENCE_MARGIN_M,
     LARGEST_UAS_M,
     Area,
-    Site,
+    MissionSite,
     Wall,
 )
 from uas_coverage_env.operations.area_import.waypoint_layout import MOST_WAYPOINTS, lay_waypoints
@@ -29,7 +29,7 @@ _LIFT_M = 3.5
 _ABOVE_LEAST_M = 0.5
 
 
-class Asked(NamedTuple):
+class Requirements(NamedTuple):
     """What is asked of waypoints.
 
     Attributes:
@@ -69,12 +69,12 @@ class Waypoints:
 
 
 def make_waypoints(
-    site: Site,
+    site: MissionSite,
     relief: Relief,
     walls: Sequence[Wall],
-    seen: Sequence[tuple[Area, Look]],
+    seen: Sequence[tuple[Area, CameraView]],
     ceiling_m: float,
-    asked: Asked,
+    asked: Requirements,
 ) -> Waypoints:
     """Waypoints from which all areas are seen.
 
@@ -91,22 +91,22 @@ def make_waypoints(
     """
     placed = _Placed(site, relief, walls, ceiling_m, asked)
     found = Waypoints()
-    for number, (area, look) in enumerate(seen):
-        layout = lay_waypoints(area.shape, look.pitch_m, placed.allowed, f"area {number + 1}")
+    for number, (area, view) in enumerate(seen):
+        layout = lay_waypoints(area.shape, view.pitch_m, placed.allowed, f"area {number + 1}")
         found.left_out_m2 += layout.left_out_m2
         found.above_m.append([])
         for place_m in layout.places_m:
-            height_m, above_m, too_high = placed.height_m(place_m, look)
+            height_m, above_m, too_high = placed.height_m(place_m, view)
             found.too_high += too_high
             found.above_m[-1].append(above_m)
             position_m = (*place_m[::-1], -height_m)
-            found.tables.setdefault(look.name, []).append(
+            found.tables.setdefault(view.name, []).append(
                 {
                     "kind": "search",
                     "position_m": [round(value, 3) for value in position_m],
                     "radius_m": asked.radius_m,
                     "weight": area.weight,
-                    **_demand(look, area.wishes, asked),
+                    **_demand(view, area.options, asked),
                 }
             )
     count = sum(map(len, found.tables.values()))
@@ -124,7 +124,12 @@ class _Placed:
     """Where waypoints may be, and how high; arguments as of `make_waypoints`."""
 
     def __init__(
-        self, site: Site, relief: Relief, walls: Sequence[Wall], ceiling_m: float, asked: Asked
+        self,
+        site: MissionSite,
+        relief: Relief,
+        walls: Sequence[Wall],
+        ceiling_m: float,
+        asked: Requirements,
     ) -> None:
         top_m = ceiling_m - FENCE_MARGIN_M
         kept = [(wall, wall.footprint.buffer(wall.safe_distance_m + KEEP_M)) for wall in walls]
@@ -138,11 +143,11 @@ class _Placed:
         self._roofs = shapely.STRtree([around for _, around in low])
         self._relief, self._ceiling_m, self._asked = relief, ceiling_m, asked
 
-    def height_m(self, place_m: tuple[float, float], look: Look) -> tuple[float, float, bool]:
+    def height_m(self, place_m: tuple[float, float], view: CameraView) -> tuple[float, float, bool]:
         """Height of a waypoint, that above the lowest ground it sees [m]; more than is asked?"""
         uneven = self._relief.ground is not None
-        low_m, high_m = self._relief.range_m(*_seen_from(*place_m, look))
-        asked_m = look.height_m + high_m
+        low_m, high_m = self._relief.range_m(*_seen_from(*place_m, view))
+        asked_m = view.height_m + high_m
         least_m = self._asked.radius_m + _LIFT_M if uneven else 0.0
         under = self._roofs.query(Point(place_m), "intersects")
         height_m = max(asked_m, least_m, *(self._over_m[k] for k in under))
@@ -154,27 +159,27 @@ class _Placed:
         return height_m, height_m - low_m, asked_m < least_m
 
 
-def _over_m(wall: Wall, asked: Asked) -> float:
+def _over_m(wall: Wall, asked: Requirements) -> float:
     """Where a waypoint may lie above a roof [m]."""
     least_m = asked.min_height_m + _ABOVE_LEAST_M if asked.min_height_m else 0.0
     return wall.top_m + max(wall.safe_distance_m, least_m) + KEEP_M
 
 
-def _seen_from(east_m: float, north_m: float, look: Look) -> Iterator[float]:
+def _seen_from(east_m: float, north_m: float, view: CameraView) -> Iterator[float]:
     """West, south, east, north of the ground that is to be seen from a place [m]."""
-    halves = [0.5 * pitch_m for pitch_m in look.pitch_m]
+    halves = [0.5 * pitch_m for pitch_m in view.pitch_m]
     for sign in (-1.0, 1.0):
         yield east_m + sign * halves[0]
         yield north_m + sign * halves[1]
 
 
-def _demand(look: Look, wishes: Wishes, asked: Asked) -> dict[str, Any]:
+def _demand(view: CameraView, options: AreaOptions, asked: Requirements) -> dict[str, Any]:
     """What a waypoint asks for."""
-    speed_mps = asked.max_speed_mps if wishes.speed_mps is None else wishes.speed_mps
-    again_s = asked.again_after_s if wishes.again_after_s is None else wishes.again_after_s
-    camera = asked.camera or speed_mps is not None or wishes.pixel_cm is not None
+    speed_mps = asked.max_speed_mps if options.speed_mps is None else options.speed_mps
+    again_s = asked.again_after_s if options.again_after_s is None else options.again_after_s
+    camera = asked.camera or speed_mps is not None or options.pixel_cm is not None
     return {
-        **({"sensor": look.name} if camera else {}),
+        **({"sensor": view.name} if camera else {}),
         **({"max_speed_mps": speed_mps} if speed_mps is not None else {}),
         **({"again_after_s": list(again_s)} if again_s else {}),
     }

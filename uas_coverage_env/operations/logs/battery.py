@@ -19,7 +19,7 @@ _LEAST_AH = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Battery:
+class BatteryRecord:
     """What the battery of a UAS did, at T samples.
 
     Attributes:
@@ -41,7 +41,7 @@ class Battery:
 
 def battery_of(
     scenario: Scenario, i: int, log: Logged, times_s: FloatArray, in_air: NDArray[np.bool_]
-) -> Battery:
+) -> BatteryRecord:
     """What the battery of UAS i did.
 
     Args:
@@ -73,15 +73,17 @@ def battery_of(
     else:
         voltage_V = _model_V(vehicle, dod, current_A)
         estimates.append(Estimate(uas.name, "voltage", "by the model of its battery"))
-    return Battery(
+    return BatteryRecord(
         dod, voltage_V, current_A, log.voltage_V is not None, tuple(estimates), tuple(notes)
     )
 
 
-def unused(scenario: Scenario, i: int, samples: int) -> Battery:
+def unused(scenario: Scenario, i: int, samples: int) -> BatteryRecord:
     """That of a UAS that stays at its start."""
     none = np.zeros(samples)
-    return Battery(np.full(samples, 1.0 - scenario.uas[i].soc_0), none, none, measured_V=False)
+    return BatteryRecord(
+        np.full(samples, 1.0 - scenario.uas[i].soc_0), none, none, measured_V=False
+    )
 
 
 def _measured_dod(

@@ -111,7 +111,7 @@ def read_bin(path: Path, content: bytes, battery: int | None) -> list[Logged]:
     Raises:
         InputError: It holds no position.
     """
-    streams = M.Streams()
+    streams = M.MessageStreams()
     whole, dropped = _undamaged(content)
     if not whole:
         raise InputError(f"{path}: holds no position (POS); is it the log of a flight?")

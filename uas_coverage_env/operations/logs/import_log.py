@@ -15,11 +15,11 @@ from uas_coverage_env.flight.log import FlightLog
 from uas_coverage_env.flight.loop import recorded_versions
 from uas_coverage_env.flight.of_log import STATES, Estimate, OfLog, Pass, Unknown
 from uas_coverage_env.operations.geodesy import LocalFrame
-from uas_coverage_env.operations.logs.battery import Battery, battery_of, unused
+from uas_coverage_env.operations.logs.battery import BatteryRecord, battery_of, unused
 from uas_coverage_env.operations.logs.flights import chosen_flight
+from uas_coverage_env.operations.logs.flown_path import FlownPath, path_of
 from uas_coverage_env.operations.logs.judged_world import FlownWorld, Moments
 from uas_coverage_env.operations.logs.logged import Logged
-from uas_coverage_env.operations.logs.trajectory import Way, way_of
 from uas_coverage_env.operations.path_geometry import distances_m
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import layout as S
@@ -75,7 +75,7 @@ def flown_flight(
     flights = {name: chosen_flight(log, (numbers or {}).get(name)) for name, log in logs.items()}
     names = plan.names
     ways = {
-        i: way_of(plan.scenario, i, flights[name], frame)
+        i: path_of(plan.scenario, i, flights[name], frame)
         for i, name in enumerate(names)
         if name in flights
     }
@@ -94,7 +94,7 @@ def flown_flight(
     )
 
 
-def _clock(dt_s: float, ways: Sequence[Way]) -> tuple[float, int]:
+def _clock(dt_s: float, ways: Sequence[FlownPath]) -> tuple[float, int]:
     """When the flight begins, on the clock of the logs, and how many steps it has."""
     begins_s = min(way.flight.begins_s for way in ways)
     steps = max(_last_step(way, begins_s, dt_s) for way in ways)
@@ -106,7 +106,7 @@ def _clock(dt_s: float, ways: Sequence[Way]) -> tuple[float, int]:
     return begins_s, max(steps, 1)
 
 
-def _last_step(way: Way, begins_s: float, dt_s: float) -> int:
+def _last_step(way: FlownPath, begins_s: float, dt_s: float) -> int:
     """The step in which it is home, or the last of which all is known."""
     steps = (way.ends_s - begins_s) / dt_s
     return math.ceil(steps - _SAME_S) if way.home else math.floor(steps + _SAME_S)
@@ -144,7 +144,7 @@ class _Judged:
     """
 
     def __init__(
-        self, scenario: Scenario, ways: Mapping[int, Way], begins_s: float, steps: int
+        self, scenario: Scenario, ways: Mapping[int, FlownPath], begins_s: float, steps: int
     ) -> None:
         self._scenario, self._ways, self._begins_s = scenario, ways, begins_s
         self._n_uas = len(scenario.uas)
@@ -158,7 +158,7 @@ class _Judged:
         self._time_s = np.unique(np.concatenate([self._grid_s, *own_s]))
         self._log_s: FloatArray = np.asarray(begins_s + self._time_s, np.float64)
         self._measured = np.stack([np.isin(self._time_s, of_one) for of_one in own_s], axis=1)
-        self.batteries: list[Battery] = [self._battery(i) for i in range(self._n_uas)]
+        self.batteries: list[BatteryRecord] = [self._battery(i) for i in range(self._n_uas)]
         self._x = np.stack([self._states(i) for i in range(self._n_uas)], axis=1)
 
     def flight(self) -> Flight:
@@ -217,7 +217,7 @@ class _Judged:
         _, first = np.unique(np.floor(times_s / _FINEST_S + _SAME_S), return_index=True)
         return times_s[first]
 
-    def _battery(self, i: int) -> Battery:
+    def _battery(self, i: int) -> BatteryRecord:
         if i not in self._ways:
             return unused(self._scenario, i, len(self._grid_s))
         way, at_s = self._ways[i], np.asarray(self._begins_s + self._grid_s, np.float64)
@@ -297,7 +297,9 @@ class _Judged:
         ]
 
 
-def _off_path_m(plan: Flight, flight: Flight, i: int, way: Way, begins_s: float) -> FloatArray:
+def _off_path_m(
+    plan: Flight, flight: Flight, i: int, way: FlownPath, begins_s: float
+) -> FloatArray:
     """(N,) distances of the places that UAS i flew from the path that it was to fly [m]."""
     ends_s = begins_s + flight.last_sample[i] * flight.scenario.dt_s
     times_s = way.log.time_s

@@ -125,7 +125,7 @@ def facts_of_text(text: str) -> list[Fact]:
 
 
 @dataclass(eq=False)
-class Streams:
+class MessageStreams:
     """What was logged of one vehicle, each with its time first.
 
     Attributes:

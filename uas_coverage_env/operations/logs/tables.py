@@ -1,7 +1,7 @@
 """What is read of logs, and what is done with what is odd in them: tables for the docs."""
 
 from uas_coverage_env.operations.logs import flights
-from uas_coverage_env.operations.logs import trajectory as way
+from uas_coverage_env.operations.logs import flown_path as way
 from uas_coverage_env.operations.logs.read_log import FORMATS
 from uas_coverage_env.operations.tables import Table
 

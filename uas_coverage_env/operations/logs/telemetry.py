@@ -95,7 +95,7 @@ def read_tlog(path: Path, content: bytes, battery: int | None) -> list[Logged]:
         InputError: It holds no position.
     """
     del content  # its parser reads files alone
-    vehicles: dict[int, M.Streams] = defaultdict(M.Streams)
+    vehicles: dict[int, M.MessageStreams] = defaultdict(M.MessageStreams)
     with opened(path) as log:
         while (message := log.recv_match(type=list(MESSAGES))) is not None:
             if message.get_srcComponent() == _AUTOPILOT:
@@ -105,7 +105,7 @@ def read_tlog(path: Path, content: bytes, battery: int | None) -> list[Logged]:
                 vehicles[system].add(float(message._timestamp), facts)
     flown = [streams for _, streams in sorted(vehicles.items()) if streams.rows[M.Position]]
     if not flown:
-        flown = [M.Streams()]
+        flown = [M.MessageStreams()]
     return [streams.logged(path, "GLOBAL_POSITION_INT", battery) for streams in flown]
 
 

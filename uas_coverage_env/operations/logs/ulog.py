@@ -105,7 +105,7 @@ def read_ulg(path: Path, content: bytes, battery: int | None) -> list[Logged]:
 
     with redirect_stdout(io.StringIO()):  # it prints what is damaged
         log: Any = ULog(io.BytesIO(content), list(MESSAGES))
-    streams = M.Streams()
+    streams = M.MessageStreams()
     if log.file_corruption:
         streams.notes.append("parts of its log are damaged, and were passed over")
     topics: dict[str, list[Any]] = {}
@@ -141,7 +141,7 @@ def _rows(topic: Any, home_alt: Callable[[Any], Any]) -> Iterator[tuple[float, d
         yield 1e-6 * time_us, {**row, "multi_id": topic.multi_id}
 
 
-def _home_alt(topics: Mapping[str, list[Any]], streams: M.Streams) -> Callable[[Any], Any]:
+def _home_alt(topics: Mapping[str, list[Any]], streams: M.MessageStreams) -> Callable[[Any], Any]:
     """The altitude of home at times (N,) as it was set last, or will be first [m]."""
     for name, field, instead in (
         ("home_position", "alt", ""),

@@ -8,7 +8,7 @@ import numpy as np
 
 from uas_coverage_env.features.steady_wind import mean_wind_mps
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.operations.mission_export.return_paths import Homeward
+from uas_coverage_env.operations.mission_export.return_paths import ReturnPath
 from uas_coverage_env.operations.mission_export.tracks import Track
 from uas_coverage_env.planning.execution.leg_model import Followed
 from uas_coverage_env.scenario import Scenario
@@ -34,7 +34,7 @@ class LegCharge:
         soc: State of charge [-].
         planned_soc: The same in the planned flight [-].
         home: What coming home from there takes by the way that is flown when the charge is low,
-            with margin (`Homeward`) [-].
+            with margin (`ReturnPath`) [-].
         spare: What is left beyond that and the reserve that `dod_max` leaves [-].
         spare_s: How long it can fly on before it has to turn home [s].
     """
@@ -48,7 +48,7 @@ class LegCharge:
     spare_s: float
 
 
-class Charged(NamedTuple):
+class BatteryUse(NamedTuple):
     """What a file takes of the battery.
 
     Attributes:
@@ -85,15 +85,15 @@ def worst_wind_mps(scenario: Scenario, track: Track) -> float:
     return mean_wind_mps(wind, -float(track.corners_m[:, 2].min())) + max(peaks, default=0.0)
 
 
-def charged(
+def battery_use(
     flight: Flight,
     track: Track,
     followed: Followed,
     speeds_mps: tuple[float, ...],
-    home: Homeward,
+    home: ReturnPath,
     soc_0: float,
     headwind_mps: float = 0.0,
-) -> Charged:
+) -> BatteryUse:
     """Charge after each leg, of level flight at full speed all the time: a careful estimate.
 
     A wind comes from ahead on every leg and all the way home: over the ground, no UAS is
@@ -138,10 +138,10 @@ def charged(
     landing_s = followed.duration_s - float(ends[-1])
     soc_landed = 1.0 - dod - dod_per_s(vehicle, min(dod, 1.0)) * landing_s
     most_home = dod_per_s(vehicle, uas.dod_max) * float(home.needs_s.max()) * against
-    return Charged(tuple(legs), soc_landed, headwind_mps, most_home)
+    return BatteryUse(tuple(legs), soc_landed, headwind_mps, most_home)
 
 
-class Levels(NamedTuple):
+class FailsafeLevels(NamedTuple):
     """At what charge a vehicle acts on its own.
 
     Attributes:
@@ -190,13 +190,13 @@ _STEP_V = 0.1
 
 def levels(
     vehicle: VehicleParams,
-    charge: Charged,
+    charge: BatteryUse,
     landing_s: float,
     *,
     dod_max: float,
     soc_start: float,
     soc_fresh: float,
-) -> Levels:
+) -> FailsafeLevels:
     """At what charge a UAS has to come home, and at what it has to land.
 
     Low is what the way home takes at the worst point of the flight, and the reserve. Where a flight
@@ -219,7 +219,7 @@ def levels(
     low = min(max(last - _UNEVEN, least), most)
     critical_V = battery.voltage_min_V
     low_V = _loaded_V(vehicle, _worn_soc(charge, soc_start, low))
-    return Levels(
+    return FailsafeLevels(
         low_soc=low,
         low_V=max(low_V, critical_V + _STEP_V),
         critical_soc=critical,
@@ -230,7 +230,7 @@ def levels(
     )
 
 
-def _worn_soc(charge: Charged, soc_start: float, low: float) -> float:
+def _worn_soc(charge: BatteryUse, soc_start: float, low: float) -> float:
     """The lowest state of charge, of its own, at which a worn pack still brings its UAS home [-].
 
     Not so high that a sound one gets there.

@@ -19,14 +19,18 @@ from uas_coverage_env.operations.mission_export.failure_responses import not_saf
 from uas_coverage_env.operations.mission_export.formats import AUTOPILOTS, FORMATS
 from uas_coverage_env.operations.mission_export.formats.parameters import FIRMWARES, PX4
 from uas_coverage_env.operations.mission_export.mission_file import (
-    Exported,
-    Settled,
+    ExportSettings,
+    MissionFile,
     followed,
     waiting,
 )
 from uas_coverage_env.operations.mission_export.report import report
 from uas_coverage_env.operations.mission_export.report_page import report_page
-from uas_coverage_env.operations.mission_export.scheduling import Begins, Part, kept_apart
+from uas_coverage_env.operations.mission_export.scheduling import (
+    FlightFiles,
+    FlightStart,
+    scheduled,
+)
 from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track, make_tracks
 from uas_coverage_env.operations.mission_export.waypoint_requirements import stopping
 from uas_coverage_env.planning.execution.leg_model import Followed
@@ -95,25 +99,25 @@ def make_export(flights: Flight | Sequence[Flight], options: ExportOptions) -> E
             were late by less than asked, wherever they wait for each other.
     """
     flights = [flights] if isinstance(flights, Flight) else list(flights)
-    settled = _settled(flights[0], options)
-    _check(options, settled)
+    settings = _settings(flights[0], options)
+    _check(options, settings)
     frame = LocalFrame(place_of_flight(flights[0], options.place))
     for flight in flights:
         check_flight(flight)
     left = [_as_events_left_it(flight) for flight in flights]
     flights = [flight for flight, _ in left]
-    laid = [_tracks(flight, covered, settled) for flight, covered in left]
+    laid = [_tracks(flight, covered, settings) for flight, covered in left]
     if not any(laid):
         raise InputError("no UAS flies in this flight; there is nothing to export")
-    parts: list[Part] = []
+    parts: list[FlightFiles] = []
     flown = sorties_summary(flights)
     for flight, tracks, entry in zip(flights, _named(laid), flown["sorties"], strict=True):
         if tracks:
             at_s = ready_s(parts[-1].lands_s, flown["swap_s"]) if parts else 0.0
-            begins = Begins(at_s, entry["begins_s"])
-            parts.append(kept_apart(flight, tracks, frame, settled, begins))
-    data = report(parts, frame, settled)
-    files = _files(parts, options, settled.tolerances)
+            begins = FlightStart(at_s, entry["begins_s"])
+            parts.append(scheduled(flight, tracks, frame, settings, begins))
+    data = report(parts, frame, settings)
+    files = _files(parts, options, settings.tolerances)
     files["report.json"] = json.dumps(data, indent=1, allow_nan=False) + "\n"
     flying = {uas["uas"] for uas in data["uas"]}
     grounded = tuple(name for name in flights[0].names if name not in flying)
@@ -140,12 +144,12 @@ def _as_events_left_it(flight: Flight) -> tuple[Flight, NDArray[np.int64]]:
     return all_there, history.covered_at[numbers]
 
 
-def _tracks(flight: Flight, covered: NDArray[np.int64], settled: Settled) -> list[Track]:
+def _tracks(flight: Flight, covered: NDArray[np.int64], settings: ExportSettings) -> list[Track]:
     """All sorties of a flight, those of a UAS one after the other."""
     return [
-        _as_asked(flight, track, settled.tolerances)
+        _as_asked(flight, track, settings.tolerances)
         for i in range(len(flight.names))
-        for track in make_tracks(flight, i, settled.tolerances, covered)
+        for track in make_tracks(flight, i, settings.tolerances, covered)
     ]
 
 
@@ -168,7 +172,9 @@ def _named(laid: Sequence[list[Track]]) -> list[list[Track]]:
     return result
 
 
-def _files(parts: Sequence[Part], options: ExportOptions, tolerances: Tolerances) -> dict[str, str]:
+def _files(
+    parts: Sequence[FlightFiles], options: ExportOptions, tolerances: Tolerances
+) -> dict[str, str]:
     files: dict[str, str] = {}
     for name in parts[0].flight.names:
         flown = [(part, one) for part in parts for one in part.of(name)]
@@ -177,7 +183,7 @@ def _files(parts: Sequence[Part], options: ExportOptions, tolerances: Tolerances
     return files
 
 
-def _settled(flight: Flight, options: ExportOptions) -> Settled:
+def _settings(flight: Flight, options: ExportOptions) -> ExportSettings:
     said = flight.scenario.execution
     usual = Tolerances.path_m, Tolerances.corner_m, MIN_SLACK_S
     if said is not None:
@@ -187,20 +193,20 @@ def _settled(flight: Flight, options: ExportOptions) -> Settled:
         value if one is None else one for one, value in zip(given, usual, strict=True)
     )
     tolerances = Tolerances(path_m, corner_m)
-    return Settled(tolerances, slack_s, options.wind_mps, options.firmware == PX4)
+    return ExportSettings(tolerances, slack_s, options.wind_mps, options.firmware == PX4)
 
 
-def _check(options: ExportOptions, settled: Settled) -> None:
+def _check(options: ExportOptions, settings: ExportSettings) -> None:
     check_choice("--format", options.kind, FORMATS)
     if options.firmware is not None:
         check_choice("--firmware", options.firmware, FIRMWARES)
         if options.firmware == PX4 and options.kind == "ardupilot":
             raise InputError("--firmware px4: --format ardupilot is of ArduPilot; take qgc")
-    check_within("--tolerance", settled.tolerances.path_m, 0.1, MOST_TOLERANCE_M)
-    check_within("--corner", settled.tolerances.corner_m, 0.1, MOST_TOLERANCE_M)
-    check_within("--min-slack", settled.min_slack_s, 0.0, 3_600.0)
-    if settled.wind_mps is not None:
-        check_within("--wind", settled.wind_mps, 0.0, 60.0)
+    check_within("--tolerance", settings.tolerances.path_m, 0.1, MOST_TOLERANCE_M)
+    check_within("--corner", settings.tolerances.corner_m, 0.1, MOST_TOLERANCE_M)
+    check_within("--min-slack", settings.min_slack_s, 0.0, 3_600.0)
+    if settings.wind_mps is not None:
+        check_within("--wind", settings.wind_mps, 0.0, 60.0)
 
 
 def _as_asked(flight: Flight, track: Track, tolerances: Tolerances) -> Track:
@@ -210,7 +216,7 @@ def _as_asked(flight: Flight, track: Track, tolerances: Tolerances) -> Track:
     return stopping(flight.scenario, track, tolerances.corner_m, fly)
 
 
-def _unkept(flight: Flight, one: Exported) -> list[str]:
+def _unkept(flight: Flight, one: MissionFile) -> list[str]:
     """A time that was not planned as the scenario's `[execution]` asks."""
     sortie = one.track.sortie
     planned_s = (sortie.landed - sortie.first) * flight.scenario.dt_s
@@ -224,7 +230,7 @@ def _unkept(flight: Flight, one: Exported) -> list[str]:
     return [f"{one.track.name}: the file takes {file_s:.0f} s, the flight {planned_s:.0f}; {why}"]
 
 
-def _notes(part: Part, *, flies: bool) -> list[str]:
+def _notes(part: FlightFiles, *, flies: bool) -> list[str]:
     """What cannot be promised, first of all where something fails."""
     flight, exports = part.flight, part.exports
     scenario = flight.scenario
@@ -260,15 +266,15 @@ def _notes(part: Part, *, flies: bool) -> list[str]:
     return notes
 
 
-def _no_return(one: Exported) -> list[str]:
+def _no_return(one: MissionFile) -> list[str]:
     """From where a UAS does not come home for sure."""
-    for charged in filter(None, (one.still, one.in_wind)):
-        lost, wind_mps = charged.point_of_no_return, charged.headwind_mps
+    for use in filter(None, (one.still, one.in_wind)):
+        lost, wind_mps = use.point_of_no_return, use.headwind_mps
         if lost is not None:
             air = f"in a headwind of {wind_mps:.1f} m/s, " if wind_mps else ""
             return [
                 f"{one.track.name}: {air}as an autopilot flies it, the charge does not suffice to "
-                f"come home for sure after leg {lost + 1}, {charged.legs[lost].time_s:.0f} s after "
+                f"come home for sure after leg {lost + 1}, {use.legs[lost].time_s:.0f} s after "
                 f"take-off"
             ]
     return []

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from uas_coverage_env.operations.mission_export.mission_file import Exported
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
 from uas_coverage_env.operations.mission_export.return_paths import RETRACE, RETURN, Span
 
 
@@ -12,7 +12,7 @@ class Failure(NamedTuple):
 
     Attributes:
         event: What it is.
-        copter: What ArduCopter does then, by `Homeward.action`; `{height:g}` is the height of its
+        copter: What ArduCopter does then, by `ReturnPath.action`; `{height:g}` is the height of its
             return [m].
         px4: Likewise PX4.
         checked: Whether that way is known to be clear and affordable, as the docs say it.
@@ -61,7 +61,7 @@ FAILURES: tuple[Failure, ...] = (
 )
 
 
-def failures_of(one: Exported, *, px4: bool) -> list[tuple[str, str]]:
+def failures_of(one: MissionFile, *, px4: bool) -> list[tuple[str, str]]:
     """What a vehicle with this file does when something fails: (event, what).
 
     Args:
@@ -75,7 +75,7 @@ def failures_of(one: Exported, *, px4: bool) -> list[tuple[str, str]]:
     return rows
 
 
-def low_charge(one: Exported) -> dict[str, Any]:
+def low_charge(one: MissionFile) -> dict[str, Any]:
     """At what charge it comes home and how, for the report."""
     levels = one.levels
     return {
@@ -94,7 +94,7 @@ def _span(span: Span) -> dict[str, float]:
     return {"from_s": round(span.from_s, 1), "to_s": round(span.to_s, 1)}
 
 
-def not_safe(one: Exported) -> Iterator[str]:
+def not_safe(one: MissionFile) -> Iterator[str]:
     """What of that cannot be promised, as phrases that follow the name of a file."""
     levels, last = one.levels, (one.in_wind or one.still).legs[-1]
     if not levels.suffices:
@@ -113,7 +113,7 @@ def not_safe(one: Exported) -> Iterator[str]:
         yield f"comes too close to {name} if it comes home early, {_when(spans)} s after its start"
 
 
-def _or_a_higher_ceiling(one: Exported) -> str:
+def _or_a_higher_ceiling(one: MissionFile) -> str:
     if one.home.action == RETURN:
         return ""
     return ", or with a fence so high that it can return straight instead of the way that it came"

@@ -34,7 +34,7 @@ _MOST_FILES = 6
 """Of more, each tried with all others, the search would take minutes."""
 
 
-class Apart(NamedTuple):
+class Schedule(NamedTuple):
     """Tracks with the waits that keep them apart.
 
     Attributes:
@@ -56,8 +56,8 @@ class Apart(NamedTuple):
 
 
 def in_layers(
-    flight: Flight, apart: Apart, tolerances: Tolerances, settle: Callable[..., Apart]
-) -> Apart:
+    flight: Flight, apart: Schedule, tolerances: Tolerances, settle: Callable[..., Schedule]
+) -> Schedule:
     """Tracks in layers where their waits are long, else as they are.
 
     Args:

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.mission_export.battery_use import (
-    Charged,
-    Levels,
-    charged,
+    BatteryUse,
+    FailsafeLevels,
+    battery_use,
     levels,
     worst_wind_mps,
 )
-from uas_coverage_env.operations.mission_export.return_paths import Homeward, Other, homeward
+from uas_coverage_env.operations.mission_export.return_paths import Other, ReturnPath, return_path
 from uas_coverage_env.operations.mission_export.tracks import STOP_S, Tolerances, Track
 from uas_coverage_env.operations.mission_export.waypoint_requirements import (
     most_mps,
@@ -36,7 +36,7 @@ _LANDING = 1.1
 """Of the time that landing is expected to take, what is allowed for it."""
 
 
-class Settled(NamedTuple):
+class ExportSettings(NamedTuple):
     """What options and scenario say together.
 
     Attributes:
@@ -52,7 +52,7 @@ class Settled(NamedTuple):
     px4: bool = False
 
 
-class Start(NamedTuple):
+class FileStart(NamedTuple):
     """How a file begins.
 
     Attributes:
@@ -71,7 +71,7 @@ class Start(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Exported:
+class MissionFile:
     """One file of an export: a UAS from a take-off to the landing after it.
 
     Attributes:
@@ -102,10 +102,10 @@ class Exported:
     holds_s: tuple[float, ...]
     waits: Waits
     followed: Followed
-    still: Charged
-    in_wind: Charged | None
-    home: Homeward
-    levels: Levels
+    still: BatteryUse
+    in_wind: BatteryUse | None
+    home: ReturnPath
+    levels: FailsafeLevels
     vehicle: VehicleParams
     frame: LocalFrame
     looks_ahead: bool
@@ -140,39 +140,44 @@ def followed(track: Track, scenario: Scenario, tolerances: Tolerances, waits: Wa
     )
 
 
-def exported(
-    flight: Flight, track: Track, frame: LocalFrame, settled: Settled, waits: Waits, start: Start
-) -> Exported:
+def mission_file(
+    flight: Flight,
+    track: Track,
+    frame: LocalFrame,
+    settings: ExportSettings,
+    waits: Waits,
+    start: FileStart,
+) -> MissionFile:
     """What there is to say about a track.
 
     Args:
         flight: What was flown.
         track: A sortie of it.
         frame: Where on the Earth.
-        settled: How it is exported.
+        settings: How it is exported.
         waits: Where it waits for others.
         start: When it is started, and how much is in its battery.
     """
     scenario, uas = flight.scenario, flight.scenario.uas[track.uas]
-    vehicle, corner_m = scenario.vehicles[track.uas], settled.tolerances.corner_m
-    flown = followed(track, scenario, settled.tolerances, waits)
+    vehicle, corner_m = scenario.vehicles[track.uas], settings.tolerances.corner_m
+    flown = followed(track, scenario, settings.tolerances, waits)
     speeds_mps, holds_s = file_speeds(track, scenario), file_holds(track, waits)
-    by, wind_mps = Autopilot.of(vehicle, corner_m), settled.wind_mps
+    by, wind_mps = Autopilot.of(vehicle, corner_m), settings.wind_mps
     wind_mps = worst_wind_mps(scenario, track) if wind_mps is None else wind_mps
-    home = homeward(
+    home = return_path(
         *(scenario, track, flown, by),
         holds_s=holds_s,
         begins_s=start.at_s,
         others=start.others,
-        nearer_end=settled.px4,
+        nearer_end=settings.px4,
     )
-    take = partial(charged, flight, track, flown, speeds_mps, home)
+    take = partial(battery_use, flight, track, flown, speeds_mps, home)
     still = take(start.soc)
     in_wind = take(start.soc_in_wind, wind_mps) if wind_mps else None
     highest_m = max(-float(flown.places_m[:, 2].min()), home.height_m or 0.0)
     lands_s = _LANDING * landing_s(highest_m, by)
     limits = {"dod_max": uas.dod_max, "soc_start": start.soc, "soc_fresh": uas.soc_0}
-    return Exported(
+    return MissionFile(
         track=track,
         begins_s=start.at_s,
         delay_s=start.delay_s,
@@ -215,7 +220,7 @@ def file_holds(track: Track, waits: Waits) -> tuple[float, ...]:
     return tuple(holds_s)
 
 
-def waiting(one: Exported) -> list[str]:
+def waiting(one: MissionFile) -> list[str]:
     """What a UAS does for others to be out of its way, as phrases that follow its name."""
     lines, waits = [], one.waits
     if one.track.layer:
@@ -229,7 +234,7 @@ def waiting(one: Exported) -> list[str]:
     return lines
 
 
-def waypoint_margins(scenario: Scenario, one: Exported) -> Sequence[float]:
+def waypoint_margins(scenario: Scenario, one: MissionFile) -> Sequence[float]:
     """How much closer than its radius the legs pass each waypoint that they cover [m]."""
     radii = [scenario.waypoints[w].radius_m for w in one.track.waypoints]
     return [r - away for r, away in zip(radii, one.track.passed_m.tolist(), strict=True)]

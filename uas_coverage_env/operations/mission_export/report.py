@@ -6,7 +6,7 @@ from typing import Any
 
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.operations.geodesy import LocalFrame
-from uas_coverage_env.operations.mission_export.battery_use import Charged
+from uas_coverage_env.operations.mission_export.battery_use import BatteryUse
 from uas_coverage_env.operations.mission_export.failure_responses import (
     failures_of,
     low_charge,
@@ -14,24 +14,26 @@ from uas_coverage_env.operations.mission_export.failure_responses import (
 )
 from uas_coverage_env.operations.mission_export.formats.geofence import ZONES
 from uas_coverage_env.operations.mission_export.mission_file import (
-    Exported,
-    Settled,
+    ExportSettings,
+    MissionFile,
     waiting,
     waypoint_margins,
 )
-from uas_coverage_env.operations.mission_export.scheduling import Part
+from uas_coverage_env.operations.mission_export.scheduling import FlightFiles
 from uas_coverage_env.planning.execution.lateness import Pair
 
 
-def report(parts: Sequence[Part], frame: LocalFrame, settled: Settled) -> dict[str, Any]:
+def report(
+    parts: Sequence[FlightFiles], frame: LocalFrame, settings: ExportSettings
+) -> dict[str, Any]:
     """The report as plain data; times, charges and delays are those of the leg model.
 
     Args:
         parts: The flights of the mission, with their files.
         frame: Where on the Earth.
-        settled: How it was exported.
+        settings: How it was exported.
     """
-    flight, tolerances = parts[0].flight, settled.tolerances
+    flight, tolerances = parts[0].flight, settings.tolerances
     zones = [obstacle.kind in ZONES for obstacle in flight.scenario.obstacles]
     passed = [{w for one in part.exports for w in one.track.waypoints} for part in parts]
     return {
@@ -45,19 +47,19 @@ def report(parts: Sequence[Part], frame: LocalFrame, settled: Settled) -> dict[s
         "duration_s": round(max(part.lands_s for part in parts), 1),
         "zones": sum(zones),
         "obstacles_not_told": len(zones) - sum(zones),
-        "uas": [_file(part, one, settled) for part, one in _in_order(parts)],
+        "uas": [_file(part, one, settings) for part, one in _in_order(parts)],
         "turnarounds": _turnarounds(parts),
         "pairs": [_pair(pair, frame) for part in parts for pair in part.pairs],
     }
 
 
-def _in_order(parts: Sequence[Part]) -> list[tuple[Part, Exported]]:
+def _in_order(parts: Sequence[FlightFiles]) -> list[tuple[FlightFiles, MissionFile]]:
     """The files, those of a UAS one after the other."""
     names = parts[0].flight.names
     return [(part, one) for name in names for part in parts for one in part.of(name)]
 
 
-def _turnarounds(parts: Sequence[Part]) -> list[dict[str, Any]]:
+def _turnarounds(parts: Sequence[FlightFiles]) -> list[dict[str, Any]]:
     """What is to be done between the sorties of each UAS, in order of time."""
     found = []
     for (part, one), (next_part, after) in pairwise(_in_order(parts)):
@@ -80,7 +82,7 @@ def _turnarounds(parts: Sequence[Part]) -> list[dict[str, Any]]:
     return sorted(found, key=lambda entry: entry["lands_s"])
 
 
-def _file(part: Part, one: Exported, settled: Settled) -> dict[str, Any]:
+def _file(part: FlightFiles, one: MissionFile, settings: ExportSettings) -> dict[str, Any]:
     flight: Flight = part.flight
     track, room = one.track, one.track.room
     sortie, dt_s = track.sortie, flight.scenario.dt_s
@@ -111,31 +113,31 @@ def _file(part: Part, one: Exported, settled: Settled) -> dict[str, Any]:
         "return_height_m": one.home.height_m,
         "low_charge": low_charge(one),
         "not_safe": list(not_safe(one)),
-        "failures": dict(failures_of(one, px4=settled.px4)),
+        "failures": dict(failures_of(one, px4=settings.px4)),
         **_charge(one, one.still),
         "in_wind": None if one.in_wind is None else _in_wind(one, one.in_wind),
         "legs": [_leg(one, n) for n in range(len(track.legs))],
     }
 
 
-def _charge(one: Exported, charged: Charged) -> dict[str, Any]:
-    lost = charged.point_of_no_return
+def _charge(one: MissionFile, battery_use: BatteryUse) -> dict[str, Any]:
+    lost = battery_use.point_of_no_return
     return {
-        "point_of_no_return": None if lost is None else _moment(one, charged, lost),
-        "least_spare": _moment(one, charged, charged.tightest),
+        "point_of_no_return": None if lost is None else _moment(one, battery_use, lost),
+        "least_spare": _moment(one, battery_use, battery_use.tightest),
     }
 
 
-def _in_wind(one: Exported, charged: Charged) -> dict[str, Any]:
+def _in_wind(one: MissionFile, battery_use: BatteryUse) -> dict[str, Any]:
     return {
-        "headwind_mps": round(charged.headwind_mps, 2),
-        "soc_landed": round(charged.soc_landed, 4),
-        **_charge(one, charged),
+        "headwind_mps": round(battery_use.headwind_mps, 2),
+        "soc_landed": round(battery_use.soc_landed, 4),
+        **_charge(one, battery_use),
     }
 
 
-def _moment(one: Exported, charged: Charged, n: int) -> dict[str, Any]:
-    charge = charged.legs[n]
+def _moment(one: MissionFile, battery_use: BatteryUse, n: int) -> dict[str, Any]:
+    charge = battery_use.legs[n]
     return {
         "leg": n + 1,
         "time_s": round(charge.time_s, 1),
@@ -145,7 +147,7 @@ def _moment(one: Exported, charged: Charged, n: int) -> dict[str, Any]:
     }
 
 
-def _leg(one: Exported, n: int) -> dict[str, Any]:
+def _leg(one: MissionFile, n: int) -> dict[str, Any]:
     leg, charge = one.track.legs[n], one.still.legs[n]
     in_wind = None if one.in_wind is None else one.in_wind.legs[n]
     return {

@@ -10,8 +10,8 @@ from uas_coverage_env.draw.terrain import scale_step_m
 from uas_coverage_env.flight.seen import SEARCH_AREA
 from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.operations.mission_export.formats.geofence import ZONES
-from uas_coverage_env.operations.mission_export.mission_file import Exported
-from uas_coverage_env.operations.mission_export.scheduling import Part
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
+from uas_coverage_env.operations.mission_export.scheduling import FlightFiles
 from uas_coverage_env.operations.mission_export.tracks import FloatArray
 from uas_coverage_env.scenario import Decoration, Obstacle
 
@@ -27,7 +27,7 @@ _FILLS = {
 }
 
 
-def map_of(parts: Sequence[Part]) -> str:
+def map_of(parts: Sequence[FlightFiles]) -> str:
     """The mission from above, north up: x is east, y is minus north.
 
     Args:
@@ -68,7 +68,7 @@ def map_of(parts: Sequence[Part]) -> str:
     return f'<svg viewBox="{box}" role="img" aria-label="{told}">{"".join(shapes)}</svg>'
 
 
-def _file(one: Exported, colour: str, pen: float) -> Iterator[str]:
+def _file(one: MissionFile, colour: str, pen: float) -> Iterator[str]:
     """The legs of a file, where it begins and ends, and from where it does not come home."""
     name = escape(one.track.name)
 
@@ -103,7 +103,7 @@ def _scale(west: float, south: float, span_m: float, pen: float) -> str:
     return f'<path d="{bar}" {_drawn(2 * pen, _INK)}/>{words}'
 
 
-def key_of(parts: Sequence[Part]) -> str:
+def key_of(parts: Sequence[FlightFiles]) -> str:
     """What is what on the map.
 
     Args:

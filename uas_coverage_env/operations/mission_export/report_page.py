@@ -7,7 +7,7 @@ from typing import Any
 from uas_coverage_env.draw.colours import page_style
 from uas_coverage_env.operations.mission_export.failure_responses import FAILURES
 from uas_coverage_env.operations.mission_export.report_map import key_of, map_of
-from uas_coverage_env.operations.mission_export.scheduling import Part
+from uas_coverage_env.operations.mission_export.scheduling import FlightFiles
 
 _STYLE = (
     page_style()
@@ -41,7 +41,7 @@ _COLUMNS = (
 _EVENTS = {failure.event: n for n, failure in enumerate(FAILURES)}
 
 
-def report_page(parts: Sequence[Part], data: dict[str, Any], notes: Sequence[str]) -> str:
+def report_page(parts: Sequence[FlightFiles], data: dict[str, Any], notes: Sequence[str]) -> str:
     """The page.
 
     Args:

@@ -86,7 +86,7 @@ class Span(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Homeward:
+class ReturnPath:
     """The way home that is flown when something fails.
 
     Attributes:
@@ -110,7 +110,7 @@ class Homeward:
         return float(np.interp(time_s, self.times_s, self.needs_s))
 
 
-def homeward(
+def return_path(
     scenario: Scenario,
     track: Track,
     followed: Followed,
@@ -120,7 +120,7 @@ def homeward(
     begins_s: float,
     others: Sequence[Other],
     nearer_end: bool = False,
-) -> Homeward:
+) -> ReturnPath:
     """The way home of a UAS that flies a file.
 
     Args:
@@ -145,14 +145,14 @@ def homeward(
     if found:
         _, height_m, near = min(found)
         needs_s = paths.return_s(height_m)
-        return Homeward(RETURN, height_m, paths.times_s, needs_s, braking, near)
+        return ReturnPath(RETURN, height_m, paths.times_s, needs_s, braking, near)
     flies_on = np.zeros(len(paths.times_s), bool)
     if nearer_end:
         flown = np.searchsorted(followed.corner_s, paths.times_s)
         flies_on = flown > len(followed.corner_s) - flown
     near = _near(paths.retracing(flies_on), paths, others, begins_s)
     needs_s = paths.retrace_s(holds_s, flies_on)
-    return Homeward(RETRACE, None, paths.times_s, needs_s, braking, near)
+    return ReturnPath(RETRACE, None, paths.times_s, needs_s, braking, near)
 
 
 class _Paths:

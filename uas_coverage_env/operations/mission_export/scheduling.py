@@ -16,13 +16,13 @@ import numpy as np
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.operations.geodesy import LocalFrame
-from uas_coverage_env.operations.mission_export.height_layers import Apart, in_layers
+from uas_coverage_env.operations.mission_export.height_layers import Schedule, in_layers
 from uas_coverage_env.operations.mission_export.mission_file import (
-    Exported,
-    Settled,
-    Start,
-    exported,
+    ExportSettings,
+    FileStart,
+    MissionFile,
     followed,
+    mission_file,
 )
 from uas_coverage_env.operations.mission_export.return_paths import Other
 from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track
@@ -33,7 +33,7 @@ from uas_coverage_env.planning.execution.separation import Waits, ready_s, separ
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class FlightFiles:
     """A flight of a mission, with the files made of it.
 
     Attributes:
@@ -44,7 +44,7 @@ class Part:
     """
 
     flight: Flight
-    exports: list[Exported]
+    exports: list[MissionFile]
     pairs: list[Pair]
     flown_from_s: float
 
@@ -53,12 +53,12 @@ class Part:
         """When all have landed, on the clock of the mission [s]."""
         return max(one.lands_s for one in self.exports)
 
-    def of(self, name: str) -> list[Exported]:
+    def of(self, name: str) -> list[MissionFile]:
         """The files of a UAS, one after the other."""
         return [one for one in self.exports if self.flight.names[one.track.uas] == name]
 
 
-class Begins(NamedTuple):
+class FlightStart(NamedTuple):
     """When a flight of a mission begins.
 
     Attributes:
@@ -70,43 +70,47 @@ class Begins(NamedTuple):
     flown_s: float = 0.0
 
 
-def kept_apart(
-    flight: Flight, tracks: Sequence[Track], frame: LocalFrame, settled: Settled, begins: Begins
-) -> Part:
+def scheduled(
+    flight: Flight,
+    tracks: Sequence[Track],
+    frame: LocalFrame,
+    settings: ExportSettings,
+    begins: FlightStart,
+) -> FlightFiles:
     """The files of a flight with the waits that they need, and how late UAS may be then.
 
     Args:
         flight: What was flown.
         tracks: Its sorties, those of a UAS one after the other.
         frame: Where on the Earth.
-        settled: How.
+        settings: How.
         begins: When the flight begins.
 
     Raises:
         InputError: Two UAS would come too close if one of them were late by less than asked,
             wherever they wait for each other.
     """
-    scenario, tolerances = flight.scenario, settled.tolerances
+    scenario, tolerances = flight.scenario, settings.tolerances
 
-    def laid(tracks: Sequence[Track], waits: Sequence[Waits]) -> Part:
-        exports = _exports(flight, tracks, frame, settled, waits, begins.at_s)
-        return Part(flight, exports, pairs_of(scenario, timed(exports)), begins.flown_s)
+    def laid(tracks: Sequence[Track], waits: Sequence[Waits]) -> FlightFiles:
+        exports = _exports(flight, tracks, frame, settings, waits, begins.at_s)
+        return FlightFiles(flight, exports, pairs_of(scenario, timed(exports)), begins.flown_s)
 
     part = laid(tracks, [Waits()] * len(tracks))
     if scenario.execution is not None:  # waits are part of the plan then
         flown = laid(tracks, [_flown_wait(flight, one) for one in part.exports])
-        if not _short(flown.pairs, settled.min_slack_s):
-            return _reported(flown, settled.min_slack_s)
-    if _short(part.pairs, settled.min_slack_s):
-        settle = partial(_apart, flight, settled, begins.at_s)
+        if not _short(flown.pairs, settings.min_slack_s):
+            return _reported(flown, settings.min_slack_s)
+    if _short(part.pairs, settings.min_slack_s):
+        settle = partial(_schedule, flight, settings, begins.at_s)
         apart = in_layers(flight, settle(tracks), tolerances, settle)
         if apart.waits is not None:
             part = laid(apart.tracks, apart.waits)
-        check_slack(part.pairs, frame, settled.min_slack_s)
-    return _reported(part, settled.min_slack_s)
+        check_slack(part.pairs, frame, settings.min_slack_s)
+    return _reported(part, settings.min_slack_s)
 
 
-def timed(exports: Sequence[Exported]) -> list[Timed]:
+def timed(exports: Sequence[MissionFile]) -> list[Timed]:
     """Files on the clock of the mission.
 
     Args:
@@ -162,13 +166,13 @@ def _exports(
     flight: Flight,
     tracks: Sequence[Track],
     frame: LocalFrame,
-    settled: Settled,
+    settings: ExportSettings,
     waits: Sequence[Waits],
     begins_s: float,
-) -> list[Exported]:
-    flown = _flown(flight, tracks, settled.tolerances, waits)
+) -> list[MissionFile]:
+    flown = _flown(flight, tracks, settings.tolerances, waits)
     starts = _starts(tracks, flown, waits, begins_s)
-    last: dict[int, Exported] = {}
+    last: dict[int, MissionFile] = {}
     result = []
     for track, (at_s, inside), wait in zip(tracks, starts, waits, strict=True):
         before = last.get(track.uas)
@@ -183,38 +187,40 @@ def _exports(
             for o, f, (o_at_s, _) in zip(tracks, flown, starts, strict=True)
             if o.uas != track.uas
         )
-        start = Start(at_s, float(wait.start_s - inside.start_s), soc, soc_in_wind, others)
-        one = exported(flight, track, frame, settled, inside, start)
+        start = FileStart(at_s, float(wait.start_s - inside.start_s), soc, soc_in_wind, others)
+        one = mission_file(flight, track, frame, settings, inside, start)
         last[track.uas] = one
         result.append(one)
     return result
 
 
-def _flown_wait(flight: Flight, one: Exported) -> Waits:
+def _flown_wait(flight: Flight, one: MissionFile) -> Waits:
     """How long a UAS waited in the flight before it set out."""
     first = int(np.flatnonzero(-one.track.flown_m[:, 2] >= TAKE_OFF_HEIGHT_M)[0])
     began_s = float(one.followed.corner_s[0])
     return Waits(max(math.floor(first * flight.scenario.dt_s - began_s), 0))
 
 
-def _apart(flight: Flight, settled: Settled, begins_s: float, tracks: Sequence[Track]) -> Apart:
+def _schedule(
+    flight: Flight, settings: ExportSettings, begins_s: float, tracks: Sequence[Track]
+) -> Schedule:
     """Tracks with waits."""
     scenario = flight.scenario
     fleet = [
         (
             track.uas,
-            partial(followed, track, scenario, settled.tolerances),
+            partial(followed, track, scenario, settings.tolerances),
         )
         for track in tracks
     ]
     pauses_s = [track.sortie.rest_s for track in tracks]
-    waits = separate(scenario, fleet, settled.min_slack_s, pauses_s, in_hover=True)
+    waits = separate(scenario, fleet, settings.min_slack_s, pauses_s, in_hover=True)
     home_s = math.inf
     if waits is not None:
-        flown = _flown(flight, tracks, settled.tolerances, waits)
+        flown = _flown(flight, tracks, settings.tolerances, waits)
         starts = _starts(tracks, flown, waits, begins_s)
         home_s = max(at_s + f.duration_s for (at_s, _), f in zip(starts, flown, strict=True))
-    return Apart(list(tracks), waits, home_s)
+    return Schedule(list(tracks), waits, home_s)
 
 
 def _short(pairs: Sequence[Pair], min_slack_s: float) -> list[Pair]:
@@ -222,7 +228,7 @@ def _short(pairs: Sequence[Pair], min_slack_s: float) -> list[Pair]:
     return [p for p in pairs if p.slack_s is not None and p.slack_s < min_slack_s]
 
 
-def _reported(part: Part, min_slack_s: float) -> Part:
+def _reported(part: FlightFiles, min_slack_s: float) -> FlightFiles:
     """A part without the pairs of files that are never flown at the same time."""
     clock = {one.name: one for one in timed(part.exports)}
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, covered_at
-from uas_coverage_env.operations.clearance import Room, Surroundings
+from uas_coverage_env.operations.clearance import Clearance, Surroundings
 from uas_coverage_env.operations.path_geometry import cut_corner, cut_path, distances_m
 from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M, Sortie, sorties_of
 from uas_coverage_env.world.coverage import covering_samples
@@ -54,7 +54,7 @@ class Leg:
     end_m: FloatArray
     sample: int
     speed_mps: float
-    room: Room
+    room: Clearance
     stop: bool = False
 
 
@@ -103,7 +103,7 @@ class Track:
         return np.array([self.take_off_m, *(leg.end_m for leg in self.legs)])
 
     @property
-    def room(self) -> Room:
+    def room(self) -> Clearance:
         """The least on all legs."""
         least = self.legs[0].room
         for leg in self.legs:

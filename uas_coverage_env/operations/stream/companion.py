@@ -22,7 +22,7 @@ from uas_coverage_env.operations.stream.link import VehicleLink
 from uas_coverage_env.operations.stream.preflight import Failsafes, meet, read_limits, take_off
 from uas_coverage_env.operations.stream.rejoin import WayBack
 from uas_coverage_env.operations.stream.slowdowns import TROUBLES
-from uas_coverage_env.operations.stream.surroundings import Around
+from uas_coverage_env.operations.stream.surroundings import SwarmSurroundings
 from uas_coverage_env.operations.stream.time_scaling import Pace
 from uas_coverage_env.operations.stream.timeline import Timeline
 from uas_coverage_env.operations.stream.vehicle_limits import Limits
@@ -97,7 +97,7 @@ class Companion:
         self,
         plans: Mapping[str, Timeline],
         fleet: Fleet,
-        around: Around,
+        around: SwarmSurroundings,
         options: StreamOptions,
         may_hurry: bool,
         check: Callable[[Pace, Mapping[str, Limits]], None],

@@ -17,7 +17,7 @@ from uas_coverage_env.operations.stream.companion import Companion, Ended, Strea
 from uas_coverage_env.operations.stream.fleet import Fleet
 from uas_coverage_env.operations.stream.giving_up import REACTIONS
 from uas_coverage_env.operations.stream.link import VehicleLink, check_address
-from uas_coverage_env.operations.stream.surroundings import Around
+from uas_coverage_env.operations.stream.surroundings import SwarmSurroundings
 from uas_coverage_env.operations.stream.time_scaling import SHARE, Pace
 from uas_coverage_env.operations.stream.timeline import Timeline, timeline_of
 from uas_coverage_env.operations.stream.vehicle_limits import Limits
@@ -75,7 +75,7 @@ def stream_flight(
         companion = Companion(
             plans,
             fleet,
-            Around(flight.scenario, list(plans)),
+            SwarmSurroundings(flight.scenario, list(plans)),
             options,
             _may_hurry(flight.scenario),
             lambda pace, limits: _check_pace(plans, pace, limits, options.late),

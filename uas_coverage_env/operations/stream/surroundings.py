@@ -21,7 +21,7 @@ _SHARE = 0.8
 _ABOVE_GROUND_M = 0.5
 
 
-class Around:
+class SwarmSurroundings:
     """Zones, obstacles, the fence, and other UAS.
 
     Args:

@@ -16,7 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
-from uas_coverage_env.operations.stream.surroundings import Around, apart_m, stopping_place_m
+from uas_coverage_env.operations.stream.surroundings import (
+    SwarmSurroundings,
+    apart_m,
+    stopping_place_m,
+)
 from uas_coverage_env.operations.stream.timeline import Timeline
 from uas_coverage_env.operations.stream.vehicle_limits import Limits
 
@@ -95,7 +99,7 @@ class Pace:
         self,
         plans: Mapping[str, Timeline],
         limits: Mapping[str, Limits],
-        around: Around,
+        around: SwarmSurroundings,
         silent_s: float,
         may_hurry: bool,
     ) -> None:
@@ -129,7 +133,7 @@ class Pace:
             late_s = max(late_s + STEP_S * (1.0 / rate - 1.0), 0.0)
         return late_s
 
-    def _with_room_to_stop(self, rates: FloatArray, around: Around) -> FloatArray:
+    def _with_room_to_stop(self, rates: FloatArray, around: SwarmSurroundings) -> FloatArray:
         """Slower where a vehicle that hears no more would come too close to what stands there."""
         rates = rates.copy()
         for name, motion in self._motions.items():
@@ -146,7 +150,7 @@ class Pace:
                     rates[max(k - 1, 0) : k + 2] = np.minimum(rates[max(k - 1, 0) : k + 2], rate)
         return rates
 
-    def _apart(self, rates: FloatArray, around: Around, silent_s: float) -> FloatArray:
+    def _apart(self, rates: FloatArray, around: SwarmSurroundings, silent_s: float) -> FloatArray:
         """Slower where one that stops would be in the way of another that has not noticed yet."""
         rates = rates.copy()
         names = list(self._motions)

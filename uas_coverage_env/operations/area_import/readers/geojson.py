@@ -12,14 +12,18 @@ from pyproj.exceptions import ProjError
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.area_import.drawn_areas import content
-from uas_coverage_env.operations.area_import.geo_features import GEOMETRIES, Feature, attributes_of
+from uas_coverage_env.operations.area_import.geo_features import (
+    GEOMETRIES,
+    GeoFeature,
+    attributes_of,
+)
 
 _DEEPEST = 20
 _OWN = {"type", "geometry", "geometries", "coordinates", "properties", "features", "bbox", "crs"}
 _OLD_EPSG = re.compile(r".*epsg\.xml#(\d+)", re.IGNORECASE)
 
 
-def read_geojson(path: Path) -> Iterator[Feature]:
+def read_geojson(path: Path) -> Iterator[GeoFeature]:
     """The features of a file.
 
     Raises:
@@ -28,7 +32,7 @@ def read_geojson(path: Path) -> Iterator[Feature]:
     yield from features(path, read_json(path))
 
 
-def features(path: Path, data: dict[str, Any]) -> Iterator[Feature]:
+def features(path: Path, data: dict[str, Any]) -> Iterator[GeoFeature]:
     """The features of what a file holds: a collection, a feature or a geometry.
 
     Args:
@@ -43,7 +47,7 @@ def features(path: Path, data: dict[str, Any]) -> Iterator[Feature]:
 
 def _features(
     path: Path, data: Any, layers: tuple[str, ...], numbers: Iterator[int], depth: int
-) -> Iterator[Feature]:
+) -> Iterator[GeoFeature]:
     _check_crs(path, data.get("crs"))
     kind = data.get("type")
     own = {key: value for key, value in data.items() if key not in _OWN}
@@ -64,7 +68,7 @@ def _features(
     geometry = data.get("geometry") if is_feature else data
     if isinstance(geometry, dict):
         _check_crs(path, geometry.get("crs"))
-    yield Feature(
+    yield GeoFeature(
         str(path),
         f"features[{number}]",
         geometry,

@@ -19,7 +19,7 @@ from defusedxml.ElementTree import fromstring
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.area_import.drawn_areas import MOST_BYTES, content
-from uas_coverage_env.operations.area_import.geo_features import Feature, attributes_of
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature, attributes_of
 from uas_coverage_env.operations.area_import.osm_tags import LEAST_M
 
 _GEOMETRIES = ("Polygon", "LinearRing", "LineString", "Point", "Track")
@@ -27,7 +27,7 @@ _NOT_READ = ("NetworkLink", "GroundOverlay", "PhotoOverlay", "ScreenOverlay", "T
 _FOLDERS = ("Document", "Folder")
 
 
-def read_kml(path: Path) -> Iterator[Feature]:
+def read_kml(path: Path) -> Iterator[GeoFeature]:
     """The placemarks of a file; attributes are their names, descriptions and extended data.
 
     Raises:
@@ -36,7 +36,7 @@ def read_kml(path: Path) -> Iterator[Feature]:
     yield from _features(path, path.stem, content(path), count(1))
 
 
-def read_kmz(path: Path) -> Iterator[Feature]:
+def read_kmz(path: Path) -> Iterator[GeoFeature]:
     """The same from all KML files of an archive, but for what macOS adds to one.
 
     Raises:
@@ -73,7 +73,7 @@ class _Within(NamedTuple):
     role: str = ""
 
 
-def _features(path: Path, layer: str, text: bytes, numbers: Iterator[int]) -> Iterator[Feature]:
+def _features(path: Path, layer: str, text: bytes, numbers: Iterator[int]) -> Iterator[GeoFeature]:
     try:
         root = fromstring(text, forbid_dtd=True)
     except DefusedXmlException:
@@ -93,7 +93,7 @@ def _features(path: Path, layer: str, text: bytes, numbers: Iterator[int]) -> It
             what = "" if geometries else "placemark without geometry"
             parts.append((what, {"type": "GeometryCollection", "geometries": geometries}))
         for what, geometry in parts:
-            yield Feature(
+            yield GeoFeature(
                 str(path),
                 f"placemark {number}",
                 geometry,

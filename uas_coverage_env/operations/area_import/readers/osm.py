@@ -14,7 +14,7 @@ from osmium.osm import Area, Node, Relation, Way
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.area_import.drawn_areas import content
 from uas_coverage_env.operations.area_import.feature_roles import speaks_of_flying
-from uas_coverage_env.operations.area_import.geo_features import Feature, attributes_of
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature, attributes_of
 from uas_coverage_env.operations.area_import.osm_tags import BUILDING, FOREST, KEYS, standing_of
 
 _KEYS = frozenset((*KEYS, "highway"))
@@ -23,7 +23,7 @@ _MOST_OBJECTS = 2_000_000
 """A file of 20 MB may hold more; a town with its surroundings has some ten thousand."""
 
 
-def read_osm(path: Path) -> list[Feature]:
+def read_osm(path: Path) -> list[GeoFeature]:
     """What a town may be made of: outlines, lines and points with tags.
 
     An outline of which the file lacks corners, as at the edge of an extract, comes as the line of
@@ -73,15 +73,15 @@ def _sorted(data: bytes, kind: str) -> bytes:
         return file.read_bytes()
 
 
-def _features(file: str, data: Any) -> Iterator[Feature]:
+def _features(file: str, data: Any) -> Iterator[GeoFeature]:
     shapes = GeoJSONFactory()
     corners: dict[int, list[float]] = {}  # of each way one
-    outlines: dict[tuple[bool, int], Feature] = {}  # by whether it is a way, and number
+    outlines: dict[tuple[bool, int], GeoFeature] = {}  # by whether it is a way, and number
 
-    def feature(thing: Any, geometry: dict[str, Any], what: str = "") -> Feature:
+    def feature(thing: Any, geometry: dict[str, Any], what: str = "") -> GeoFeature:
         number = thing.orig_id() if isinstance(thing, Area) else thing.id
         word = "way" if isinstance(thing, Area) and thing.from_way() else thing.__class__.__name__
-        return Feature(file, f"{word.lower()} {number}", geometry, _tags(thing), what=what)
+        return GeoFeature(file, f"{word.lower()} {number}", geometry, _tags(thing), what=what)
 
     for thing in osmium.FileProcessor(data).with_areas():
         line: list[list[float]] = []

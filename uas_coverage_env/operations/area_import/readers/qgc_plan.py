@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.geo_features import Feature
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature
 from uas_coverage_env.operations.area_import.readers.geojson import read_json
 
 PX4 = 12
@@ -47,7 +47,7 @@ ITEMS: Mapping[str, Item] = {
 """`complexItemType` -> what becomes of it; others are left out and named."""
 
 
-def read_plan(path: Path) -> Iterator[Feature]:
+def read_plan(path: Path) -> Iterator[GeoFeature]:
     """What is surveyed, structures, fences, exclusions, and the planned home.
 
     A plan without a survey is searched within its fences.
@@ -64,7 +64,7 @@ def read_plan(path: Path) -> Iterator[Feature]:
         raise InputError(f"{path}: is a broken QGroundControl plan; save it again") from None
 
 
-def _features(file: str, plan: Mapping[str, Any]) -> Iterator[Feature]:
+def _features(file: str, plan: Mapping[str, Any]) -> Iterator[GeoFeature]:
     mission = plan.get("mission") or {}
     complex_items = False
     counts: dict[str, Iterator[int]] = {}
@@ -74,7 +74,7 @@ def _features(file: str, plan: Mapping[str, Any]) -> Iterator[Feature]:
             kind = "polygon" if "polygon" in item else None  # a survey of an old plan
         what = ITEMS.get("survey" if kind in ("polygon", "Survey") else str(kind))
         if what is None:
-            yield Feature(file, "a mission item", None, {}, what=str(kind or "mission item"))
+            yield GeoFeature(file, "a mission item", None, {}, what=str(kind or "mission item"))
             continue
         complex_items = True
         word = kind if kind in ITEMS else "survey"
@@ -82,7 +82,7 @@ def _features(file: str, plan: Mapping[str, Any]) -> Iterator[Feature]:
         key, shape = what.geometry
         places = _turned(item.get(key) or ())
         said = {own: item[theirs] for own, theirs in what.attributes.items() if theirs in item}
-        yield Feature(
+        yield GeoFeature(
             file,
             name,
             {"type": shape, "coordinates": [places] if shape == "Polygon" else places},
@@ -95,7 +95,7 @@ def _features(file: str, plan: Mapping[str, Any]) -> Iterator[Feature]:
     if home:
         height_m = home[2] if len(home) > 2 else None
         known = isinstance(height_m, int | float) and not isinstance(height_m, bool)
-        yield Feature(
+        yield GeoFeature(
             file,
             "planned home",
             {"type": "Point", "coordinates": _turned([home])[0]},
@@ -103,10 +103,10 @@ def _features(file: str, plan: Mapping[str, Any]) -> Iterator[Feature]:
             ground_m=float(height_m) if known else None,
         )
     for _ in (plan.get("rallyPoints") or {}).get("points") or ():
-        yield Feature(file, "a rally point", None, {}, what="rally point")
+        yield GeoFeature(file, "a rally point", None, {}, what="rally point")
 
 
-def _fences(file: str, plan: Mapping[str, Any], *, alone: bool) -> Iterator[Feature]:
+def _fences(file: str, plan: Mapping[str, Any], *, alone: bool) -> Iterator[GeoFeature]:
     """Inclusions and exclusions; alone: what they include is searched, too."""
     fence = plan.get("geoFence") or {}
     px4 = (plan.get("mission") or {}).get("firmwareType") == PX4
@@ -127,7 +127,7 @@ def _fences(file: str, plan: Mapping[str, Any], *, alone: bool) -> Iterator[Feat
             said = {"radius_m": radius_m}
         inside = ("fence", "search") if alone else ("fence",)
         for role in inside if one.get("inclusion") else ("no_fly",):
-            yield Feature(
+            yield GeoFeature(
                 file,
                 name,
                 geometry,

@@ -15,7 +15,7 @@ from pyproj.exceptions import ProjError
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.area_import.drawn_areas import MOST_CORNERS, content
-from uas_coverage_env.operations.area_import.geo_features import Feature, attributes_of
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature, attributes_of
 from uas_coverage_env.operations.area_import.osm_tags import KEYS
 
 _LANGUAGES: Mapping[int, str] = {
@@ -33,7 +33,7 @@ _LONGEST_NAME = 10
 """Of a field: longer keys of tags are cut off there."""
 
 
-def read_shapefile(path: Path) -> Iterator[Feature]:
+def read_shapefile(path: Path) -> Iterator[GeoFeature]:
     """The shapes of a layer, with attributes from the fields of its table.
 
     Raises:
@@ -131,9 +131,9 @@ def _feature(
     shape: shapefile.Shape | None,
     fields: Mapping[str, Any] | None,
     to_degrees: pyproj.Transformer,
-) -> Feature:
+) -> GeoFeature:
     if fields is None:
-        return Feature(str(path), f"row {number + 1}", None, {}, what="deleted row")
+        return GeoFeature(str(path), f"row {number + 1}", None, {}, what="deleted row")
     kind = shapefile.NULL if shape is None else shape.shapeType
     if shape is not None and len(getattr(shape, "points", ())) > MOST_CORNERS:
         raise InputError(
@@ -146,7 +146,7 @@ def _feature(
     elif shape is not None and kind != shapefile.NULL and shape.points:
         geometry = shape.__geo_interface__
         geometry = {**geometry, "coordinates": _turned(geometry["coordinates"], to_degrees)}
-    return Feature(
+    return GeoFeature(
         str(path),
         f"row {number + 1}",
         geometry,

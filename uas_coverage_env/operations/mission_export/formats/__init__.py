@@ -16,11 +16,11 @@ from uas_coverage_env.operations.mission_export.formats.track_files import (
     geojson_text,
     kml_text,
 )
-from uas_coverage_env.operations.mission_export.mission_file import Exported
-from uas_coverage_env.operations.mission_export.scheduling import Part
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
+from uas_coverage_env.operations.mission_export.scheduling import FlightFiles
 from uas_coverage_env.operations.mission_export.tracks import Tolerances
 
-Flown = Sequence[tuple[Part, Exported]]
+Flown = Sequence[tuple[FlightFiles, MissionFile]]
 """The sorties of one UAS in their order, each with the flight that it is part of."""
 
 Writer = Callable[[str, Flown, Tolerances, str | None], Mapping[str, str]]

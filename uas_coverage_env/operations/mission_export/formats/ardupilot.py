@@ -8,11 +8,11 @@ from uas_coverage_env.operations.mission_export.formats.mission_items import (
     LONGITUDE,
     items_of,
 )
-from uas_coverage_env.operations.mission_export.mission_file import Exported
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
 from uas_coverage_env.operations.mission_export.tracks import Tolerances
 
 
-def waypoints_text(one: Exported, tolerances: Tolerances) -> str:
+def waypoints_text(one: MissionFile, tolerances: Tolerances) -> str:
     """The text of a .waypoints file; its first line is home.
 
     Args:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from uas_coverage_env.geometry.outline import outline_of
-from uas_coverage_env.operations.mission_export.mission_file import Exported
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
 from uas_coverage_env.scenario import Scenario
 
 ZONES = ("no_fly", "outside_fence")
@@ -15,7 +15,7 @@ _STAY_IN, _STAY_OUT = 5001, 5002
 _GLOBAL = 0
 
 
-def polygons_of(scenario: Scenario, one: Exported) -> list[tuple[list[list[float]], bool]]:
+def polygons_of(scenario: Scenario, one: MissionFile) -> list[tuple[list[list[float]], bool]]:
     """Each polygon as corners of latitude and longitude [degrees], and whether to stay in it.
 
     Args:
@@ -35,7 +35,7 @@ def polygons_of(scenario: Scenario, one: Exported) -> list[tuple[list[list[float
     return found
 
 
-def fence_text(scenario: Scenario, one: Exported) -> str:
+def fence_text(scenario: Scenario, one: MissionFile) -> str:
     """The text of a .fence file (QGC WPL 110), one corner a line, as MAVProxy loads it.
 
     Args:

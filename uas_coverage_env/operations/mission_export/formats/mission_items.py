@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from uas_coverage_env.operations.mission_export.mission_file import Exported
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
 
 WAYPOINT, LAND, TAKE_OFF, YAW, CHANGE_SPEED, TRIGGER_DISTANCE = 16, 21, 22, 115, 178, 206
 """MAV_CMD."""
@@ -35,7 +35,7 @@ class Item:
     params: tuple[float, ...]
 
 
-def items_of(one: Exported, corner_m: float, *, px4: bool) -> list[Item]:
+def items_of(one: MissionFile, corner_m: float, *, px4: bool) -> list[Item]:
     """Take-off, the wait for others, legs with their speeds and pictures, and landing.
 
     A wait is a stay at a waypoint: one on the ground would pass while a vehicle in AUTO is not

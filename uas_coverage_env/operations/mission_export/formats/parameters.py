@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from uas_coverage_env.operations.mission_export.mission_file import Exported
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
 from uas_coverage_env.operations.mission_export.return_paths import CEILING_MARGIN_M, RETURN
 from uas_coverage_env.operations.mission_export.tracks import Tolerances
 from uas_coverage_env.planning.execution.leg_model import LAND_BELOW_M, LAND_MPS, Autopilot
@@ -47,7 +47,7 @@ class Facts(NamedTuple):
     """What values follow from: the mission, the file, and how far from a corner it may pass."""
 
     scenario: Scenario
-    one: Exported
+    one: MissionFile
     tolerances: Tolerances
 
     @property

@@ -13,7 +13,7 @@ from uas_coverage_env.operations.mission_export.formats.mission_items import (
     Item,
     items_of,
 )
-from uas_coverage_env.operations.mission_export.mission_file import Exported
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
 from uas_coverage_env.operations.mission_export.tracks import Tolerances
 from uas_coverage_env.scenario import Scenario
 
@@ -26,7 +26,7 @@ _VEHICLE_TYPES = {4: 2, 6: 13, 8: 14}
 _RELATIVE_ALTITUDE = 1
 
 
-def plan_text(scenario: Scenario, one: Exported, tolerances: Tolerances, *, px4: bool) -> str:
+def plan_text(scenario: Scenario, one: MissionFile, tolerances: Tolerances, *, px4: bool) -> str:
     """The text of a plan.
 
     Args:

@@ -10,10 +10,10 @@ from xml.sax.saxutils import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.operations.mission_export.mission_file import Exported
-from uas_coverage_env.operations.mission_export.scheduling import Part
+from uas_coverage_env.operations.mission_export.mission_file import MissionFile
+from uas_coverage_env.operations.mission_export.scheduling import FlightFiles
 
-Flown = Sequence[tuple[Part, Exported]]
+Flown = Sequence[tuple[FlightFiles, MissionFile]]
 
 
 def kml_text(name: str, flown: Flown) -> str:

@@ -39,7 +39,7 @@ _DOWN_M = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class FlownPath:
     """One UAS in the frame of the mission, on the clock of its log.
 
     Attributes:
@@ -98,7 +98,7 @@ class Way:
         return _interpolated(times_s, self.log.time_s, self.log.attitude_rad)
 
 
-def way_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame) -> Way:
+def path_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame) -> FlownPath:
     """Where UAS i was.
 
     Raises:
@@ -131,7 +131,7 @@ def way_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame) 
             how = f"from take-off: an offset of {abs(offset_m):.1f} m (too {side}) is taken off"
             estimates.append(Estimate(uas.name, "height", how))
     left_s, ends_s, home, said = _ends(scenario, flight, start_m, log.time_s, places_m)
-    return Way(
+    return FlownPath(
         flight, log, places_m, left_s, ends_s, home,
         tuple(unknown), doubtful, tuple(estimates), (*notes, *said),
     )  # fmt: skip
