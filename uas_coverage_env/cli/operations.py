@@ -135,9 +135,9 @@ def import_area(
         from uas_coverage_env.operations import (
             ImportOptions,
             make_scenario,
-            minutes_of,
             read_drawings,
         )
+        from uas_coverage_env.operations.area_import.area_options import minutes_of
     if out.suffix != ".toml":
         raise InputError(f"--out {out}: should end in .toml")
     if out.exists() and not overwrite:
@@ -234,7 +234,8 @@ def export(
 ) -> None:
     """Write a file for each sortie, few straight checked legs, and a report (extra `ops`)."""
     with extra():
-        from uas_coverage_env.operations import ENDINGS, ExportOptions, make_export
+        from uas_coverage_env.operations import ExportOptions, make_export
+        from uas_coverage_env.operations.mission_export.formats import ENDINGS
     if out.is_dir() and any(out.iterdir()) and not overwrite:
         raise InputError(f"--out {out}: is not empty; give another or add --overwrite")
     options = ExportOptions(

@@ -61,7 +61,7 @@ def stream(
     at once.
     """
     with extra():
-        from uas_coverage_env.operations.export import place_of_flight
+        from uas_coverage_env.operations.flight_checks import place_of_flight
         from uas_coverage_env.operations.stream import RealClock, StreamOptions, stream_flight
     if track is not None:
         check_file(track, (".csv",), overwrite=overwrite)
