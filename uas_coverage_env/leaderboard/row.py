@@ -97,6 +97,8 @@ class _Flown:
     @classmethod
     def failed(cls, entry: Entry, reason: str, source_sha256: str) -> Self:
         """The row of a flight that could not be flown to its end."""
+        figures = rows_part(None)
+        figures["n_uas"] = len(entry.scenario.uas)
         return cls(
             **_identity(entry),
             status=FAILED,
@@ -107,7 +109,7 @@ class _Flown:
             versions="{}",
             source_sha256=source_sha256,
             finished_at=_now(),
-            **{**rows_part(None), "n_uas": len(entry.scenario.uas)},
+            **figures,
         )
 
     @property

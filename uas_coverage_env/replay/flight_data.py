@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight
-from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.figures import NOTHING, printed
 from uas_coverage_env.flight.metrics import energy_until_Wh
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.flight.seen import seen_pictures
@@ -34,6 +34,9 @@ FLOOR_M = 0.1
 SEEN_M = 0.1
 SHARE = 0.0001
 
+_OUTCOME = ("steps", "energy_Wh", "all_home", "breaches")
+"""Figures of the line below the title; all of them are in a table that opens."""
+
 
 def flight_data(flight: Flight, source: str) -> dict[str, Any]:
     """A flight as plain data for the viewer (`viewer/src/flight_data.ts` has its types).
@@ -48,7 +51,6 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
     Raises:
         InputError: A value of the flight is not finite, so that it has no place in a picture.
     """
-    outcome = summary(flight)
     durations_s = np.array([decision.duration_s for decision in flight.decisions])
     series = {
         "position": (flight.x[..., 0:3], POSITION_M),
@@ -88,10 +90,9 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "no_return": list(home.no_return),
         "least_spare": [[sample, round(spare, 4)] for sample, spare in home.least_spare],
         "marks": marks(flight, history, room, home),
-        "violations": outcome["violations"],
-        "summary": {
-            key: outcome[key] for key in ("coverage", "steps", "energy_Wh", "all_home", "breaches")
-        },
+        "violations": flight.figures["violations"],
+        "summary": {name: flight.figures[name] for name in _OUTCOME},
+        "figures": [[name, text] for name, text in printed(flight).items() if text != NOTHING],
     }
 
 

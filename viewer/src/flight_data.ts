@@ -124,8 +124,9 @@ export interface FlightData {
   fallbacks: number[];
   plan: { unit: number; steps: number[][][] };
   violations: Violation[];
+  /** Heading and text of each figure of the flight, as `show` prints them. */
+  figures: [string, string][];
   summary: {
-    coverage: number;
     steps: number;
     energy_Wh: number;
     all_home: boolean;

@@ -75,6 +75,7 @@ export function someFlight(): FlightData {
     fallbacks: [],
     plan: { unit: 0.1, steps: [[[10, 20, 30], []], []] },
     violations: [{ t_s: 0.5, uas: "uas_2", kind: "geofence", with: null }],
-    summary: { coverage: 1, steps: 2, energy_Wh: 1, all_home: false, breaches: 0 },
+    figures: [["steps", "2"]],
+    summary: { steps: 2, energy_Wh: 1, all_home: false, breaches: 0 },
   };
 }
