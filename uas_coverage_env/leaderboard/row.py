@@ -37,7 +37,7 @@ class _Flown:
         safety_filter: Whether the filter was on for all UAS.
         status: `flown`, or `failed` where there is no flight.
         reason: Why it failed.
-        verdict: What the independent checker says: `agrees`, `not judged: ` and why, or in what it
+        verdict: What the independent checker says: `agrees`, `not judged:` and why, or in what it
             disagrees; None where it was not asked.
         failed_figures: Which figures could not be computed, and why; None: all could.
         trajectory_sha256: Hash of every state of every UAS.
