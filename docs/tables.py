@@ -359,19 +359,19 @@ FIGURES = {each.name: each for each in figures.FIGURES}
 """Those of this package, whatever others are installed."""
 
 OPERATIONS = {
-    "areas": ("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
-    "exports": ("exported_files", "autopilot_parameters", "autopilot_failures"),
-    "streams": ("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
+    "area_import": ("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
+    "mission_export": ("exported_files", "autopilot_parameters", "autopilot_failures"),
+    "stream": ("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
     "logs": ("log_formats", "log_rules"),
 }
-"""Tables of `uas_coverage_env.operations.tables`, by module."""
+"""Tables of the rooms of `uas_coverage_env.operations`, by room."""
 
 
-def of_operations(module: str, name: str) -> Callable[[], str]:
+def of_operations(room: str, name: str) -> Callable[[], str]:
     """A table that `uas_coverage_env.operations` makes, which needs the extra `ops`."""
 
     def made() -> str:
-        found = importlib.import_module(f"uas_coverage_env.operations.tables.{module}")
+        found = importlib.import_module(f"uas_coverage_env.operations.{room}.tables")
         head, rows = getattr(found, name)()
         return table(head, rows)
 

@@ -3,7 +3,8 @@
 import dataclasses
 from pathlib import Path
 
-from uas_coverage_env.leaderboard import FAILED, FLOWN, TIMES, Row
+from uas_coverage_env.leaderboard import Row
+from uas_coverage_env.leaderboard.row import FAILED, FLOWN, TIMES
 from uas_coverage_env.runner import rows_in
 
 

@@ -144,7 +144,7 @@ def test_what_is_no_figure_is_refused_in_one_line(named, said, monkeypatch):
 def test_every_number_has_a_column_in_rows_and_in_tables():
     flight = rollout(meadow(), "hover", max_steps=2)
     numbers = {name for name, each in figures.figures().items() if each.kind in (int, float, bool)}
-    assert numbers <= set(figures.row_figures(flight))
+    assert numbers <= set(figures.rows_part(figures.computed(flight)[0]))
     assert numbers <= set(Row.__dataclass_fields__)
     assert len(columns()) > len(numbers)
     headings = [each.heading for each in columns().values()]
@@ -157,7 +157,7 @@ def test_a_flight_looks_its_figures_up_by_name(tmp_path):
     assert set(flight.figures) == set(figures.figures())
     again = Flight.load(flight.save(tmp_path))
     assert dict(again.figures) == dict(flight.figures)
-    assert dict(figures.row_figures(None)).items() >= {"coverage": 0.0, "steps": None}.items()
+    assert figures.rows_part(None).items() >= {"coverage": 0.0, "steps": None}.items()
 
 
 class Works:

@@ -6,7 +6,7 @@ import sys
 import polars
 
 from uas_coverage_env.cli import main
-from uas_coverage_env.leaderboard import TIMES
+from uas_coverage_env.leaderboard.row import TIMES
 
 RUN = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
 

@@ -15,9 +15,8 @@ from uas_coverage_env.leaderboard import (
     Row,
     bounds_of,
     leaderboard_figure,
-    published,
+    read_comparison,
     scores_of,
-    write,
 )
 from uas_coverage_env.leaderboard.row import FLOWN
 from uas_coverage_env.leaderboard.scores import Flights, Scores, _of_figure
@@ -160,7 +159,7 @@ def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):
         failed_row("a", "p", 2),
     ]
     comparison = Comparison.of(rows, 12, "base", "uas-coverage compare ...", "2 flights at a time")
-    names = write(comparison, tmp_path)
+    names = comparison.write(tmp_path)
     assert set(names) <= {path.name for path in tmp_path.iterdir()}
     scores = json.loads((tmp_path / "table.json").read_text())
     assert [one["label"] for one in scores["scores"]] == ["base", "p"]
@@ -176,7 +175,7 @@ def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):
 
 def test_the_picture_is_drawn_for_any_flights(tmp_path):
     rows = [row("a", "base"), failed_row("a", "p"), row("b", "q", violations=1)]
-    assert "coverage-energy.png" in write(Comparison.of(rows, 3, "base", "c", "j"), tmp_path)
+    assert "coverage-energy.png" in Comparison.of(rows, 3, "base", "c", "j").write(tmp_path)
     assert (tmp_path / "coverage-energy.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -213,27 +212,27 @@ def kept(rows, directory):
     with opened(directory, {"command": "compare"}, Row) as store:
         for one in rows:
             store.add(one)
-    write(Comparison.of(rows, 3, rows[0].label, "c", "j"), directory)
+    Comparison.of(rows, 3, rows[0].label, "c", "j").write(directory)
 
 
 def test_what_is_published_is_read_again(tmp_path):
     rows = [row("a", "base"), failed_row("a", "p"), row("b", "base", energy_Wh=None)]
     kept(rows, tmp_path)
-    assert published(tmp_path) == (rows, "base")
+    assert read_comparison(tmp_path) == (rows, "base")
 
 
 def test_what_is_no_comparison_of_this_version_is_refused(tmp_path):
     with pytest.raises(InputError, match="holds no flights that can be read"):
-        published(tmp_path)
+        read_comparison(tmp_path)
     kept([row("a", "base")], tmp_path)
     table = tmp_path / "table.json"
     table.write_text('{"reference": "nobody"}')
     with pytest.raises(InputError, match="'nobody' has no flight"):
-        published(tmp_path)
+        read_comparison(tmp_path)
     for text in ("{", "[]", "{}"):
         table.write_text(text)
         with pytest.raises(InputError, match=r"table\.json: cannot be read"):
-            published(tmp_path)
+            read_comparison(tmp_path)
 
 
 def test_the_return_is_that_of_all_flights_there_are_and_says_of_how_many():
@@ -269,14 +268,14 @@ def test_a_note_names_the_planners_that_fly_alike_with_every_seed():
         (Figure("spare_Wh", float, len, "", over="most", digits=0), 3.0, "3"),
         (Figure("spare_Wh", float, len, "", over="least"), 1.0, "1.00"),
         (Figure("wait_s", float, len, "", over="average", unit="ms"), 2000.0, "2000"),
-        (Figure("spares", int, len, "", over="total"), 4, "4"),
-        (Figure("spares", int, len, "", over="median"), 2.0, "2.0"),
+        (Figure("spare_uas", int, len, "", over="total"), 4, "4"),
+        (Figure("spare_uas", int, len, "", over="median"), 2.0, "2.0"),
         (Figure("spare", bool, len, ""), 4, "4/2"),
     ],
 )
 def test_a_figure_is_summed_up_over_flights_as_it_says(figure, value, cell):
     class Flown:
-        status, spares = FLOWN, 0
+        status = FLOWN
 
         def __init__(self, found):
             self.found = found

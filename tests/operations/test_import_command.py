@@ -20,11 +20,16 @@ from drawings import HIGH, HOME, SQUARE, collection, feature, imported, refused
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, TakeOff, read_drawings
-from uas_coverage_env.operations.drawing import MOST_CORNERS
-from uas_coverage_env.operations.tags import GUESSED_OTHER_M, STOREY_M, height_m, standing_of
+from uas_coverage_env.operations.area_import.drawn_areas import MOST_CORNERS
+from uas_coverage_env.operations.area_import.osm_tags import (
+    GUESSED_OTHER_M,
+    STOREY_M,
+    height_m,
+    standing_of,
+)
 from uas_coverage_env.scenario import load_scenario, warnings
 
-EXAMPLES = Path(str(resources.files("uas_coverage_env.operations"))) / "examples"
+EXAMPLES = Path(str(resources.files("uas_coverage_env.operations.area_import"))) / "examples"
 
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

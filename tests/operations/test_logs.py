@@ -26,8 +26,8 @@ from uas_coverage_env.flight import covered_at, rest_of
 from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.operations import LocalFrame, flown_flight, read_log
-from uas_coverage_env.operations.flown_way import AT_HOME_M
-from uas_coverage_env.operations.logs import Logged
+from uas_coverage_env.operations.logs.flown_path import AT_HOME_M
+from uas_coverage_env.operations.logs.logged import Logged
 from uas_coverage_env.scenario import Place, Scenario, load_scenario
 
 HERE = ("--place", "47.5,19.05")
@@ -294,7 +294,7 @@ def test_recorded_flights_of_an_autopilot_come_home_and_are_judged(tmp_path, cap
 HEAD = "t_s,latitude_deg,longitude_deg,height_m"
 MISTAKES = {
     "no file": (None, "cannot be read or written (no such file"),
-    "nothing": ("", "has no column t_s"),
+    "nothing": ("", "is empty"),
     "no column": ("t_s,lat,lon\n0,1,2", "has no column latitude_deg"),
     "no rows": (HEAD, "holds no sample"),
     "no number": (f"{HEAD}\n0,47,x,1", "line 2: longitude_deg 'x' is no number"),

@@ -4,8 +4,11 @@ import pytest
 
 pytest.importorskip("pyproj")
 
+from uas_coverage_env.operations.area_import import tables as areas
+from uas_coverage_env.operations.logs import tables as logs
+from uas_coverage_env.operations.mission_export import tables as exports
 from uas_coverage_env.operations.stream import giving_up
-from uas_coverage_env.operations.tables import areas, exports, logs, streams
+from uas_coverage_env.operations.stream import tables as streams
 
 TABLES = (
     *(areas.area_roles, areas.area_words, areas.plan_items, areas.town_kinds, areas.town_not_read),

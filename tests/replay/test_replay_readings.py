@@ -8,6 +8,7 @@ import pytest
 from small_worlds import box, meadow
 
 from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.figures import NOTHING, printed
 from uas_coverage_env.flight.record import DecisionRecord, EventRecord
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.mission import MissionBrief, Range
@@ -34,6 +35,13 @@ def test_the_page_says_what_range_says(plain):
         for i in range(uas):
             spare = range_.spare_dod(i, plain.x[k, i])
             assert soc[k, i] - needed[k, i] == pytest.approx(spare, abs=1.1e-4)
+
+
+def test_the_page_has_the_figures_that_show_prints(plain):
+    data = flight_data(plain, "here")
+    told = {name: text for name, text in printed(plain).items() if text != NOTHING}
+    assert dict(data["figures"]) == told
+    assert told["steps"] == str(data["summary"]["steps"])
 
 
 def test_the_point_of_no_return_is_where_nothing_is_left_beyond_the_way_home(discharged):

@@ -22,24 +22,21 @@ from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_others
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import (
-    FLIGHTS,
-    FLOWN,
-    Bounds,
     Comparison,
-    Entry,
     Row,
     Sweep,
     bounds_of,
-    parquet,
     planner_specs_of,
     scenarios_of,
     seed_range,
-    write,
 )
 from uas_coverage_env.leaderboard import table as tables
+from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.front import Choice, choices_of, front_cells
 from uas_coverage_env.leaderboard.planner_specs import varied_keys
-from uas_coverage_env.leaderboard.publish import FRONT
+from uas_coverage_env.leaderboard.publish import FLIGHTS, FRONT, parquet
+from uas_coverage_env.leaderboard.row import FLOWN
+from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.runner import Store, WorkerLostError, Workers, opened, rows_in
 from uas_coverage_env.scenario import Scenario, warnings
 
@@ -164,7 +161,7 @@ def compare(
     fronts = _fronts(rows, flown, varied_keys(vary or ()), bounds)
     command = command_line(context, leave_out=("reuse", "overwrite"))
     comparison = Comparison.of(rows, len(entries), reference, command, str(workers), bounds, fronts)
-    names = write(comparison, out)
+    names = comparison.write(out)
     if with_parquet:
         write_files(out, {FLIGHTS: parquet(rows)})
         names.append(FLIGHTS)

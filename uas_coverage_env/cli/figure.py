@@ -11,7 +11,8 @@ from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.leaderboard import SCORES, leaderboard_figure, published, scores_of
+from uas_coverage_env.leaderboard import leaderboard_figure, read_comparison, scores_of
+from uas_coverage_env.leaderboard.publish import SCORES
 from uas_coverage_env.replay.figure_kinds import KINDS, figure_of
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def _drawn(directories: list[Path], kind: str, step: int | None) -> "Figure":
     from uas_coverage_env.replay.figures.training import with_baselines
 
     if kind == _LEADERBOARD:
-        rows, reference = published(directories[0])
+        rows, reference = read_comparison(directories[0])
         return leaderboard_figure(scores_of(rows, reference), rows, reference)
     if kind == _TRAINING:
         return training_figure(with_baselines(_named(directories)))

@@ -17,7 +17,7 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight.directory import check_directory
 
 if TYPE_CHECKING:
-    from uas_coverage_env.operations.logs import Logged
+    from uas_coverage_env.operations.logs.logged import Logged
 
 
 def log(
@@ -56,7 +56,7 @@ def log(
     """Make a flight directory from logs of UAS that flew, judged by the rules (extra `ops`)."""
     with ops():
         from uas_coverage_env.operations import LocalFrame, flown_flight
-        from uas_coverage_env.operations.export import place_of_flight
+        from uas_coverage_env.operations.flight_checks import place_of_flight
     check_directory(out, overwrite=overwrite)
     planned = load_planned(plan)
     scenario = planned.scenario
@@ -106,7 +106,7 @@ def _by_uas(
     logs: Sequence[str], names: Sequence[str], batteries: Mapping[str, int]
 ) -> "dict[str, Logged]":
     """The logs by the UAS that they are of."""
-    from uas_coverage_env.operations.logs import read_log
+    from uas_coverage_env.operations.logs.read_log import read_log
 
     found: dict[str, Logged] = {}
     for text in logs:

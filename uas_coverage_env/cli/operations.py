@@ -136,7 +136,8 @@ class AskedImport:
 
     def options(self) -> "ImportOptions":
         """How the area is flown."""
-        from uas_coverage_env.operations import ImportOptions, minutes_of
+        from uas_coverage_env.operations import ImportOptions
+        from uas_coverage_env.operations.area_import.area_options import minutes_of
 
         return taken(
             ImportOptions,
@@ -225,7 +226,8 @@ class AskedExport:
 def export(asked: AskedExport) -> None:
     """Write a file for each sortie, few straight checked legs, and a report (extra `ops`)."""
     with ops():
-        from uas_coverage_env.operations import ENDINGS, ExportOptions, make_export
+        from uas_coverage_env.operations import ExportOptions, make_export
+        from uas_coverage_env.operations.mission_export.formats import ENDINGS
     out = asked.out
     if out.is_dir() and any(out.iterdir()) and not asked.overwrite:
         raise InputError(f"--out {out}: is not empty; give another or add --overwrite")

@@ -70,7 +70,7 @@ def stream(asked: Asked) -> None:
     at once.
     """
     with ops():
-        from uas_coverage_env.operations.export import place_of_flight
+        from uas_coverage_env.operations.flight_checks import place_of_flight
         from uas_coverage_env.operations.stream import RealClock, StreamOptions, stream_flight
     if asked.track is not None:
         check_file(asked.track, (".csv",), overwrite=asked.overwrite)

@@ -13,8 +13,11 @@ from uas_coverage_env.cli.output import FAILED, one_line
 from uas_coverage_env.cli.progress import missions_shown
 from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard import FLOWN, Entry, Row, failures, source_of
+from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.flying import Kept, fly
+from uas_coverage_env.leaderboard.publish import failures
+from uas_coverage_env.leaderboard.row import FLOWN
+from uas_coverage_env.leaderboard.sweep import Entry, source_of
 from uas_coverage_env.runner import Job, Store, WorkerLostError, Workers
 
 

@@ -277,7 +277,7 @@ class Picture:
 
 
 def _colour(i: int) -> colours.Colour:
-    return colours.UAS[i % len(colours.UAS)]
+    return colours.of_uas(i)
 
 
 def _summed_up(swarm: SwarmState) -> str:

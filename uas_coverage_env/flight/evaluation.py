@@ -7,8 +7,17 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.flight.figures import NOTHING, ByName, Figure, computed, figures, rows_part
-from uas_coverage_env.flight.flight import Flight, unless_stopped
+from uas_coverage_env.flight.figures import (
+    NOTHING,
+    ByName,
+    Figure,
+    computed,
+    figures,
+    repeated,
+    rows_part,
+)
+from uas_coverage_env.flight.flight import Flight
+from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.flight.loop import rollout
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.flight.policy import as_planner
@@ -25,7 +34,8 @@ class Episode(ByName):
         seed: Of the mission, as in `reset(seed=...)`.
         scenario: Name of the scenario that it drew.
         reward_terms: Term -> its part of the return.
-        figures: By name, as rows have them: `coverage`, `energy_Wh`, `steps`, `lost`, ...
+        figures: By name, as rows have them: `coverage`, `energy_Wh`, `steps`, `lost`, ...; not
+            those of what it took to compute, so that a mission flown again is equal.
         failed_figures: Which could not be computed -> why.
     """
 
@@ -40,7 +50,10 @@ class Episode(ByName):
         """What a flight is in numbers."""
         values, failed = computed(flight)
         terms = values["reward_terms"] or {}
-        return cls(seed, flight.scenario.name, terms, rows_part(values), failed)
+        row = rows_part(values)
+        return cls(
+            seed, flight.scenario.name, terms, {name: row[name] for name in repeated()}, failed
+        )
 
 
 @dataclass(frozen=True)
@@ -74,7 +87,7 @@ class Evaluation:
         terms = {f"  {name}": f"{self.mean(name):.2f}" for name in self.episodes[0].reward_terms}
         lines = {"missions": f"{len(self.episodes)}"}
         for name, figure in figures().items():
-            if figure.in_rows and figure.shown and figure.repeats:
+            if figure.shown and name in self.episodes[0].figures:
                 lines[figure.label] = self._summed_up(figure)
             if name == "episode_return":
                 lines |= terms

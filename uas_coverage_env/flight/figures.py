@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from operator import attrgetter
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.files.errors import InputError
@@ -142,7 +142,11 @@ class Figure:
 class ByName:
     """What has `figures`: each is an attribute of it, too."""
 
-    figures: Mapping[str, Any]
+    if TYPE_CHECKING:
+
+        @property
+        def figures(self) -> Mapping[str, Any]:
+            """By name."""
 
     def __getattr__(self, name: str) -> Any:
         """A figure."""
@@ -215,12 +219,12 @@ def computed(flight: FlightRecord) -> tuple[dict[str, Any], dict[str, str]]:
     return values, failed
 
 
-def row_figures(flight: FlightRecord | None) -> dict[str, bool | int | float | None]:
-    """What rows hold of a flight; None: of one that failed."""
-    return rows_part(None if flight is None else computed(flight)[0])
+def repeated() -> list[str]:
+    """The names of those in rows that a repeatable flight repeats."""
+    return [name for name, figure in figures().items() if figure.in_rows and figure.repeats]
 
 
-def rows_part(values: Mapping[str, Any] | None) -> dict[str, bool | int | float | None]:
+def rows_part(values: Mapping[str, Any] | None) -> dict[str, Any]:
     """Of figures as they are computed, what rows hold; None: of a flight that failed."""
     return {
         name: figure.in_row(None if values is None else values[name])
@@ -283,7 +287,9 @@ def _entries(field: str) -> Callable[[FlightRecord], list[Any] | None]:
 
 def _of_log(field: str) -> Callable[[FlightRecord], list[Any] | None]:
     def entries(flight: FlightRecord) -> list[Any] | None:
-        return flight.of_log and [asdict(each) for each in getattr(flight.of_log, field)]
+        if flight.of_log is None:
+            return None
+        return [asdict(each) for each in getattr(flight.of_log, field)]
 
     return entries
 

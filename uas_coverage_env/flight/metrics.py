@@ -80,6 +80,13 @@ def min_soc(flight: FlightRecord) -> float:
     return float(flight.soc.min())
 
 
+def energy_until_Wh(flight: FlightRecord) -> NDArray[np.float64]:
+    """(T, U) [Wh] the same over the samples before each."""
+    power_W = flight.voltage_V * flight.current_A
+    until_W = np.concatenate([np.zeros_like(power_W[:1]), np.cumsum(power_W[:-1], axis=0)])
+    return until_W * flight.scenario.dt_s / _J_PER_WH
+
+
 def packs_used(flight: FlightRecord) -> dict[str, int]:
     """UAS -> battery packs that it has flown with, where each swaps on its own."""
     swaps = Counter(swap.uas for swap in flight.swaps)

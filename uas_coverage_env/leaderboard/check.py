@@ -13,7 +13,7 @@ _LONGEST = 2000
 
 
 def verdict_on(flight: Flight, directory: Path | None = None) -> str:
-    """`agrees`, in what the checker disagrees, or `not judged: ` and why.
+    """`agrees`, in what the checker disagrees, or `not judged:` and why.
 
     A contact is no disagreement where the flight says so, too.
 

@@ -85,33 +85,30 @@ class Comparison:
             )
         return lines
 
+    def write(self, directory: Path) -> list[str]:
+        """Write all files; returns their names.
 
-def write(comparison: Comparison, directory: Path) -> list[str]:
-    """Write all files; returns their names.
-
-    Raises:
-        InputError: One cannot be written.
-    """
-    files = {
-        "table.csv": _csv(comparison.scores).encode(),
-        SCORES: _json(comparison).encode(),
-        TABLE: _markdown(comparison).encode(),
-        PICTURE: drawn(
-            lambda: leaderboard_figure(comparison.scores, comparison.rows, comparison.reference)
-        ),
-    }
-    if fronts := comparison.fronts:
-        parts = [f"`{comparison.command}`\n"]
-        for name, choices in fronts.items():
-            parts += [f"{name}:\n", markdown(front_cells(choices))]
-        files[FRONT] = "\n".join(parts).encode()
-        files[FRONT_PICTURE] = drawn(lambda: front_figure(fronts))
-    there = {name: content for name, content in files.items() if content is not None}
-    write_files(directory, there)
-    return list(there)
+        Raises:
+            InputError: One cannot be written.
+        """
+        files = {
+            "table.csv": _csv(self.scores).encode(),
+            SCORES: _json(self).encode(),
+            TABLE: _markdown(self).encode(),
+            PICTURE: drawn(lambda: leaderboard_figure(self.scores, self.rows, self.reference)),
+        }
+        if fronts := self.fronts:
+            parts = [f"`{self.command}`\n"]
+            for name, choices in fronts.items():
+                parts += [f"{name}:\n", markdown(front_cells(choices))]
+            files[FRONT] = "\n".join(parts).encode()
+            files[FRONT_PICTURE] = drawn(lambda: front_figure(fronts))
+        there = {name: content for name, content in files.items() if content is not None}
+        write_files(directory, there)
+        return list(there)
 
 
-def published(directory: Path) -> tuple[list[Row], str]:
+def read_comparison(directory: Path) -> tuple[list[Row], str]:
     """The flights of a comparison and the label of its reference, from the files that it wrote.
 
     Raises:

@@ -37,7 +37,7 @@ class _Flown:
         safety_filter: Whether the filter was on for all UAS.
         status: `flown`, or `failed` where there is no flight.
         reason: Why it failed.
-        verdict: What the independent checker says: `agrees`, `not judged: ` and why, or in what it
+        verdict: What the independent checker says: `agrees`, `not judged:` and why, or in what it
             disagrees; None where it was not asked.
         failed_figures: Which figures could not be computed, and why; None: all could.
         trajectory_sha256: Hash of every state of every UAS.
@@ -97,6 +97,8 @@ class _Flown:
     @classmethod
     def failed(cls, entry: Entry, reason: str, source_sha256: str) -> Self:
         """The row of a flight that could not be flown to its end."""
+        figures = rows_part(None)
+        figures["n_uas"] = len(entry.scenario.uas)
         return cls(
             **_identity(entry),
             status=FAILED,
@@ -107,7 +109,7 @@ class _Flown:
             versions="{}",
             source_sha256=source_sha256,
             finished_at=_now(),
-            **{**rows_part(None), "n_uas": len(entry.scenario.uas)},
+            **figures,
         )
 
     @property

@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from uas_coverage_env.draw import colours
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.replay.outline import outline_of
+from uas_coverage_env.geometry.outline import outline_of
 
 
 def scene_data(history: SceneHistory) -> dict[str, Any]:
@@ -29,7 +29,7 @@ def scene_data(history: SceneHistory) -> dict[str, Any]:
             {
                 "name": obstacle.name,
                 "kind": obstacle.kind or "",
-                "colour": hex_colour(colours.of_obstacle(obstacle.kind)),
+                "colour": colours.hex_of(colours.of_obstacle(obstacle.kind)),
                 "from": int(since),
                 **_body(hull),
             }
@@ -40,7 +40,7 @@ def scene_data(history: SceneHistory) -> dict[str, Any]:
         "decorations": [
             {
                 "kind": item.kind or "",
-                "colour": hex_colour(colours.of_decoration(item.kind)),
+                "colour": colours.hex_of(colours.of_decoration(item.kind)),
                 "outline": _metres(np.array(item.polygon_m)),
             }
             for item in scenario.decorations
@@ -71,7 +71,7 @@ def scene_data(history: SceneHistory) -> dict[str, Any]:
         "uas": [
             {
                 "name": uas.name,
-                "colour": hex_colour(colours.UAS[i % len(colours.UAS)]),
+                "colour": colours.hex_of(colours.of_uas(i)),
                 "homes": _homes(history, i),
                 "lowest_soc": round(1.0 - uas.dod_max, 4),
             }
@@ -98,14 +98,9 @@ def _body(hull: ConvexPolytope) -> dict[str, Any]:
     return {
         "corners": _metres(corners),
         "triangles": triangles.tolist(),
-        "outline": _metres(outline_of(hull)),
+        "outline": _metres(outline_of(hull.vertices_m)),
     }
 
 
 def _metres(values: NDArray[np.float64]) -> list[Any]:
     return values.round(2).tolist()
-
-
-def hex_colour(colour: colours.Colour) -> str:
-    """As the page writes it: #rrggbb."""
-    return "#" + "".join(f"{part:02x}" for part in colour)

@@ -28,12 +28,13 @@ import numpy as np
 
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.flight import Planner, as_planner
-from uas_coverage_env.flight.figures import ByName, figures
+from uas_coverage_env.flight.figures import ByName, repeated
 from uas_coverage_env.flight.policy import Policy, PolicyFunction
-from uas_coverage_env.leaderboard import Entry, PlannerSpec, Row
+from uas_coverage_env.leaderboard import PlannerSpec, Row
 from uas_coverage_env.leaderboard.flying import flown
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.leaderboard.statistics import Estimate, estimate
+from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.tasks.levels import level_named
@@ -70,7 +71,8 @@ class MissionScore(ByName):
     Attributes:
         seed: Of the mission.
         value: See above.
-        figures: Of its flight (docs/flight_directory.md), by name; they are attributes of it, too.
+        figures: Of its flight (docs/flight_directory.md), by name, but for those of what it took
+            to compute; they are attributes of it, too.
     """
 
     seed: int
@@ -80,7 +82,7 @@ class MissionScore(ByName):
     @classmethod
     def of(cls, row: Row) -> Self:
         """The score of a flight; one that could not be flown is worth nothing."""
-        found = {name: getattr(row, name) for name, each in figures().items() if each.in_rows}
+        found = {name: getattr(row, name) for name in repeated()}
         return cls(row.seed, mission_value(row), found)
 
 

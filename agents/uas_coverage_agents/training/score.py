@@ -14,9 +14,11 @@ from uas_coverage_agents.policy.directory import weights_sha256
 from uas_coverage_agents.policy.planner import runner_of
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.flight import Assistants, Planner
-from uas_coverage_env.leaderboard import FAILED, Entry, PlannerSpec, Row, source_of
+from uas_coverage_env.leaderboard import PlannerSpec, Row
 from uas_coverage_env.leaderboard.flying import fly as fly_entry
+from uas_coverage_env.leaderboard.row import FAILED
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
+from uas_coverage_env.leaderboard.sweep import Entry, source_of
 from uas_coverage_env.runner import Job, Store, Workers
 from uas_coverage_env.scenario import Scenario
 

@@ -16,7 +16,7 @@ from uas_coverage_baselines.reproduction.sweeps import Trade
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.metrics import energy_Wh
-from uas_coverage_env.leaderboard import machine
+from uas_coverage_env.leaderboard.hardware import machine
 from uas_coverage_env.leaderboard.table import NOTHING, Cells, markdown
 from uas_coverage_env.replay.figures import battery_figure, map_figure, png_of
 

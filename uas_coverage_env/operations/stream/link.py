@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.stream.autopilots import ARDUPILOT, AUTOPILOTS, Name
 from uas_coverage_env.operations.stream.failsafes import STATION
 

@@ -18,6 +18,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, seen_ground
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.flight.seen import SeenGround
+from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.replay.figures.map_legend import LANDED, LOST, SEEN_ALPHA, legend_of
 from uas_coverage_env.replay.figures.style import (
     MANY,
@@ -28,7 +29,6 @@ from uas_coverage_env.replay.figures.style import (
     width_in,
     words_colour,
 )
-from uas_coverage_env.replay.outline import outline_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle.layout import PSI
 
@@ -118,7 +118,7 @@ def _flat(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _terrain(axes: Axes, scenario: Scenario) -> None:
-    fence = _flat(outline_of(scenario.fence))
+    fence = _flat(outline_of(scenario.fence.vertices_m))
     axes.add_patch(Polygon(fence, facecolor=shade(colours.GROUND), edgecolor="none"))
     for item in scenario.decorations:
         tint = colours.of_decoration(item.kind)
@@ -127,7 +127,7 @@ def _terrain(axes: Axes, scenario: Scenario) -> None:
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
         tint = colours.of_obstacle(obstacle.kind)
         edge = shade(colours.shaded(tint, 0.6))
-        corners = _flat(outline_of(hull))
+        corners = _flat(outline_of(hull.vertices_m))
         axes.add_patch(Polygon(corners, facecolor=shade(tint), edgecolor=edge, linewidth=0.6))
     axes.add_patch(Polygon(fence, fill=False, edgecolor=shade(colours.INK), linewidth=1.2))
 
@@ -172,7 +172,7 @@ def _heights(
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
         words = f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
         box_m = m_per_pt * _LABEL_PT * np.array([_LETTER * len(words), 1.1])
-        place = free_place(_flat(outline_of(hull)), box_m, discs_m)
+        place = free_place(_flat(outline_of(hull.vertices_m)), box_m, discs_m)
         if place is not None:
             tint = colours.of_obstacle(obstacle.kind)
             heights.append((place, words, shade(colours.shaded(tint, 0.35))))

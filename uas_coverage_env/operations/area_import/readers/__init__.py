@@ -1,0 +1,1 @@
+"""Readers of what was drawn or mapped: files as features, a module for each format."""
