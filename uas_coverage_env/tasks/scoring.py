@@ -188,7 +188,7 @@ def spec_of(
 
 def entry_of(spec: PlannerSpec, task: Task, seed: int, scenario: Scenario) -> Entry:
     """The flight of a mission of a level."""
-    limited = MissionSettings(max_cycles=task.max_cycles).limited(scenario)
+    limited = MissionSettings(max_steps=task.max_steps).limited(scenario)
     return Entry(
         limited,
         scenario_hash(limited),
@@ -223,7 +223,7 @@ class RandomPolicy(PolicyFunction):
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission."""
         super().reset(brief, seed)
-        self._space = self._cockpit.actions.space()
+        self._space = self._interface.actions.space()
         self._space.seed(seed)
 
     def _drawn(self, seen: Any) -> Any:
