@@ -34,6 +34,8 @@ from uas_coverage_env.env.actions.given import actions_of
 from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 from uas_coverage_env.env.api.aec import in_turns
 from uas_coverage_env.env.api.documentation import with_settings_written_out
+from uas_coverage_env.env.batch.memory import FINAL, LANES
+from uas_coverage_env.env.episode.memory import LEARNERS
 from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE, full_state, grid, local
 from uas_coverage_env.env.observation.layout import layout_table
 from uas_coverage_env.env.rendering.screen import RENDER_MODES
@@ -378,7 +380,24 @@ def of_operations(room: str, name: str) -> Callable[[], str]:
     return made
 
 
+def batch_arrays() -> str:
+    """The arrays of a batch: from the declarations, and what is said below each field there."""
+    places = ((LANES, "batch.lanes"), (LEARNERS, "batch.learners"), (FINAL, "batch.missions.final"))
+    rows = []
+    for memory, place in places:
+        text = inspect.getsource(memory.declaration)
+        said = dict(re.findall(r'^    (\w+): Annotated.*?\n    """(.*?)"""', text, re.M | re.S))
+        lanes = () if memory is LANES or memory is FINAL else ("L",)
+        for field in memory.fields:
+            axes = ", ".join(str(axis) for axis in (*lanes, *field.axes))
+            kind = "record" if field.dtype.names else str(field.dtype)
+            meaning = " ".join(said.get(field.name, "").split())
+            rows.append((f"`{place}.{field.name}`", f"({axes})", kind, meaning))
+    return table(("array", "shape", "dtype", "meaning"), rows)
+
+
 PARTS: dict[str, Callable[[], str]] = {
+    "batch_arrays": batch_arrays,
     "environments": environments,
     "environment_summary": environment_summary,
     "observation_groups": observation_groups,

@@ -371,12 +371,7 @@ class World:
     @property
     def visits_to_come(self) -> int:
         """How often waypoints are still to be covered, now and when they are asked for again."""
-        state = self.state
-        later = 0
-        for w, due_step in enumerate(state.due_step):
-            if state.uncovered[w] or due_step > state.step[0]:
-                later += len(self.known.waypoints[w].again_after_s)
-        return int(state.uncovered.sum()) + later
+        return visits_to_come(self.known, self.state)
 
     @property
     def time_s(self) -> float:
@@ -386,3 +381,17 @@ class World:
     def swarm_state(self) -> SwarmState:
         """What planners see now, in arrays of their own."""
         return swarm_state(self.known, self.arena, self.state)
+
+
+def visits_to_come(known: Scenario, state: WorldState) -> int:
+    """How often waypoints are still to be covered, now and when they are asked for again.
+
+    Args:
+        known: The scenario as it is now.
+        state: The state of its mission.
+    """
+    later = 0
+    for w, due_step in enumerate(state.due_step):
+        if state.uncovered[w] or due_step > state.step[0]:
+            later += len(known.waypoints[w].again_after_s)
+    return int(state.uncovered.sum()) + later

@@ -344,8 +344,7 @@ class CoverageBatch:
     def swarm_state(self, lane: int) -> SwarmState:
         """What a planner of this lane sees now, in arrays of their own."""
         arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scene[lane]))
-        state = STATE.lane(self.worlds, lane, ARENA.sizes_of(arena))
-        return swarm_state(self.scenario_of(lane), arena, state)
+        return swarm_state(self.scenario_of(lane), arena, self.state_of(lane))
 
     def actions_of(
         self, commands: Sequence[Mapping[str, Command]], *, clip: bool = False
@@ -384,6 +383,11 @@ class CoverageBatch:
             LEARNERS.lane(self.learners, lane, sizes),
             self.settings.dynamics == "nonlinear",
         )
+
+    def state_of(self, lane: int) -> WorldState:
+        """The state of the world of a lane; its arrays are views."""
+        arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scene[lane]))
+        return STATE.lane(self.worlds, lane, ARENA.sizes_of(arena))
 
     def brief_of(self, lane: int) -> MissionBrief:
         """What a planner may know of the mission of a lane."""
