@@ -16,8 +16,7 @@ from uas_coverage_env.flight.figures import (
     repeated,
     rows_part,
 )
-from uas_coverage_env.flight.flight import Flight
-from uas_coverage_env.flight.flight import unless_stopped
+from uas_coverage_env.flight.flight import Flight, unless_stopped
 from uas_coverage_env.flight.loop import rollout
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.flight.policy import as_planner

@@ -94,7 +94,7 @@ def energy_until_Wh(flight: FlightRecord) -> NDArray[np.float64]:
     """(T, U) [Wh] the same over the samples before each."""
     power_W = flight.voltage_V * flight.current_A
     until_W = np.concatenate([np.zeros_like(power_W[:1]), np.cumsum(power_W[:-1], axis=0)])
-    return until_W * flight.scenario.dt_s / _J_PER_WH
+    return until_W * flight.scenario.dt_s / _S_PER_H
 
 
 def packs_used(flight: FlightRecord) -> dict[str, int]:

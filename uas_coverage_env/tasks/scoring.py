@@ -242,7 +242,7 @@ def _flown_side_by_side(
     whole = isinstance(batch, int) and not isinstance(batch, bool)
     if not whole or batch < 1:
         raise ValueError(f"batch is {batch!r}; give a whole number from 1 on, or None")
-    measured = [name for name, each in figures().items() if each.in_rows]
+    measured = repeated()
     settings = task.settings(**chosen)
     for seed, found in flown_in_batches(policy, missions, settings, batch, swarm_of):
         every = {name: found.get(name) for name in measured}
