@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 
 from uas_coverage_env.leaderboard import FAILED, FLOWN, TIMES, Row
-from uas_coverage_env.runner import rows_in
+from uas_coverage_env.runner.store import rows_in
 
 
 def row(scenario="a", label="p", seed=0, **changes) -> Row:

@@ -32,7 +32,8 @@ from uas_coverage_env.leaderboard import (
     write,
 )
 from uas_coverage_env.leaderboard import table as tables
-from uas_coverage_env.runner import Store, WorkerLostError, Workers, opened, rows_in
+from uas_coverage_env.runner.jobs import WorkerLostError, Workers
+from uas_coverage_env.runner.store import Store, opened, rows_in
 from uas_coverage_env.scenario import Scenario, warnings
 from uas_coverage_env.simulation import Dynamics
 

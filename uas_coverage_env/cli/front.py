@@ -27,7 +27,8 @@ from uas_coverage_env.leaderboard import FLOWN, Row, Sweep, scenarios_of
 from uas_coverage_env.leaderboard import front as fronts
 from uas_coverage_env.leaderboard import table as tables
 from uas_coverage_env.leaderboard.flying import kept_as
-from uas_coverage_env.runner import Workers, opened
+from uas_coverage_env.runner.jobs import Workers
+from uas_coverage_env.runner.store import opened
 
 _WEIGHTS = "weight_energy=0,0.02,0.05,0.1,0.2,0.4,0.6,1,2,5,20"
 _NARROWEST_TABLE = 100

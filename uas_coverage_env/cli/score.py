@@ -13,7 +13,8 @@ from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_former
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.leaderboard import Entry, PlannerSpec, Row
-from uas_coverage_env.runner import Workers, opened
+from uas_coverage_env.runner.jobs import Workers
+from uas_coverage_env.runner.store import opened
 from uas_coverage_env.tasks.levels import LEVELS
 from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
 from uas_coverage_env.tasks.table import markdown

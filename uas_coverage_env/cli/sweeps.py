@@ -14,7 +14,8 @@ from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import FLOWN, Entry, Row, failures, source_of
 from uas_coverage_env.leaderboard.flying import Kept, fly
-from uas_coverage_env.runner import Job, Store, WorkerLostError, Workers
+from uas_coverage_env.runner.jobs import Job, WorkerLostError, Workers
+from uas_coverage_env.runner.store import Store
 
 
 def fly_and_keep(

@@ -26,8 +26,7 @@ from uas_coverage_env.leaderboard.table import (
     reference_cells,
     scenarios_cells,
 )
-from uas_coverage_env.runner import STORE, rows_in
-from uas_coverage_env.runner.store import columns_of
+from uas_coverage_env.runner.store import STORE, columns_of, rows_in
 
 FLIGHTS, TABLE, SCORES = "flights.parquet", "table.md", "table.json"
 PICTURE = "coverage-energy.png"
