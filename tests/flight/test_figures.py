@@ -39,7 +39,7 @@ import json, sys
 from uas_coverage_env import Flight, evaluate
 from uas_coverage_env.cli import main
 from uas_coverage_env.leaderboard import Row
-from uas_coverage_env.runner import rows_in
+from uas_coverage_env.runner.store import rows_in
 from pathlib import Path
 
 fly = ["run", "open_field", "--planner", "hover", "--steps", "3", "--quiet", "--out", "f"]

@@ -36,7 +36,8 @@ from uas_coverage_env.leaderboard.planner_specs import varied_keys
 from uas_coverage_env.leaderboard.publish import FLIGHTS, FRONT, parquet
 from uas_coverage_env.leaderboard.row import FLOWN
 from uas_coverage_env.leaderboard.sweep import Entry
-from uas_coverage_env.runner import Store, WorkerLostError, Workers, opened, rows_in
+from uas_coverage_env.runner.jobs import WorkerLostError, Workers
+from uas_coverage_env.runner.store import Store, opened, rows_in
 from uas_coverage_env.scenario import Scenario, warnings
 from uas_coverage_env.simulation import Dynamics
 

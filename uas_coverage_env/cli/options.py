@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.runner import Backend
+from uas_coverage_env.runner.jobs import Backend
 
 LAST_SEED = 2**64 - 1
 """The largest seed of a flight."""
