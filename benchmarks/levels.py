@@ -21,7 +21,7 @@ import numpy as np
 
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.statistics import iqm
-from uas_coverage_env.runner import rows_in
+from uas_coverage_env.runner.store import rows_in
 from uas_coverage_env.tasks import LEVELS, SPLITS
 from uas_coverage_env.tasks.scoring import RANDOM, Anchors, MissionScore, scored
 from uas_coverage_env.tasks.table import markdown

@@ -16,13 +16,11 @@ from __future__ import annotations
 
 import csv
 import json
-import multiprocessing
 import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,23 +33,18 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Progress as FlightProgress
 from uas_coverage_env.flight import describe_planners
+from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.flight.registry import options_of
 from uas_coverage_env.independent_check import BadFlightError, check
 from uas_coverage_env.leaderboard import seed_range
+from uas_coverage_env.runner.jobs import Job, Workers
 from uas_coverage_env.scenario import sample_scenario
 
 PLANNERS = "milp-mpc,milp-mpc-guided,lawnmower,nearest-waypoint"
 SEEDS = "1000:1020"
 CLEAN, TOUCHED, BAD_INPUT, STOPPED = 0, 1, 2, 130
-_SECONDS_BETWEEN_LOOKS = 0.5
 _TABLE_WIDTH = 190
-_STOP = "stop"  # among what the flights tell each other; no mission has this name
-
-
-class StoppedError(Exception):
-    """A flight was ended by hand: there is nothing to keep."""
 
 
 @dataclass(frozen=True)
@@ -70,24 +63,19 @@ class Mission:
         return f"{self.scenario.name} {self.planner}"
 
 
-def fly(mission: Mission, told: MutableMapping[str, str] | None = None) -> Row:
+def fly(mission: Mission) -> Row:
     """Fly a mission unless its directory holds it, and judge it.
 
     The directory appears whole or not at all.
 
-    Args:
-        mission: What to fly.
-        told: To which the flight's progress is written, under the mission's name; once it holds
-            `_STOP`, the flight ends.
-
     Raises:
         InputError: The directory holds another flight, or cannot be written.
-        StoppedError: Ctrl-C ended the flight.
+        KeyboardInterrupt: Ctrl-C ended the flight.
     """
     if mission.directory.exists():
         _make_sure_it_is(mission)
     else:
-        _fly_and_keep(mission, told)
+        _fly_and_keep(mission)
     summary = json.loads((mission.directory / "summary.json").read_text(encoding="utf-8"))
     try:
         report = check(mission.directory)
@@ -97,24 +85,9 @@ def fly(mission: Mission, told: MutableMapping[str, str] | None = None) -> Row:
     return Row.of(mission.scenario.name, mission.planner, n_uas, summary, report)
 
 
-def _fly_and_keep(mission: Mission, told: MutableMapping[str, str] | None) -> None:
-    def tell(progress: FlightProgress) -> None:
-        if told is not None:
-            swarm = progress.swarm
-            told[mission.name] = (
-                f"step {swarm.step}, {progress.covered}/{len(swarm.uncovered)} covered"
-            )
-
+def _fly_and_keep(mission: Mission) -> None:
     planner = load_planner(mission.planner, mission.options)
-    flight = rollout(
-        mission.scenario,
-        planner,
-        seed=mission.seed,
-        on_step=tell,
-        should_stop=lambda: told is not None and _STOP in told,
-    )
-    if flight.ended == "stopped":
-        raise StoppedError
+    flight = unless_stopped(rollout(mission.scenario, planner, seed=mission.seed))
     folder = mission.directory.parent
     folder.mkdir(parents=True, exist_ok=True)
     half_done = folder / f".{mission.directory.name}.{os.getpid()}"
@@ -198,40 +171,18 @@ def _folder(out: Path | None) -> Iterator[Path]:
 
 def fly_all(missions: Sequence[Mission], jobs: int, console: Console) -> list[Row]:
     """All missions, in processes side by side, with a bar that shows how far they are."""
-    context = multiprocessing.get_context(
-        "spawn"
-    )  # threads and compiled code do not survive a fork
     rows: dict[str, Row] = {}
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     with (
-        context.Manager() as manager,
-        ProcessPoolExecutor(jobs, mp_context=context) as pool,
+        Workers(jobs) as workers,
         Progress(*columns, TimeElapsedColumn(), console=console) as progress,
     ):
-        told = manager.dict()
         bar = progress.add_task("flying", total=len(missions))
-        futures: dict[Future[Row], Mission] = {pool.submit(fly, m, told): m for m in missions}
-        waiting = set(futures)
-        try:
-            while waiting:
-                done, waiting = wait(waiting, _SECONDS_BETWEEN_LOOKS, FIRST_COMPLETED)
-                for future in done:
-                    name = futures[future].name
-                    rows[name] = future.result()
-                    told.pop(name, None)
-                    progress.advance(bar)
-                    if not rows[name].clean or not console.is_terminal:
-                        progress.console.print(
-                            rows[name].line(), highlight=False, markup=False, soft_wrap=True
-                        )
-                underway = "; ".join(f"{name}: {text}" for name, text in sorted(told.items()))
-                progress.update(bar, description=underway or "flying")
-        except (KeyboardInterrupt, Exception) as error:
-            told[_STOP] = ""  # some wait inside the pool, where they cannot be cancelled
-            pool.shutdown(cancel_futures=True)
-            if isinstance(error, KeyboardInterrupt):
-                raise StoppedError from error
-            raise
+        for job, row in workers.run(Job(one.name, fly, (one,)) for one in missions):
+            rows[job.key] = row
+            progress.update(bar, description=job.key, advance=1)
+            if not row.clean or not console.is_terminal:
+                progress.console.print(row.line(), highlight=False, markup=False, soft_wrap=True)
     return [rows[mission.name] for mission in missions]
 
 
@@ -265,7 +216,11 @@ def main(
     with _folder(out) as folder:
         shares = planner_options(names, option or ())
         missions = _missions(names, shares, seed_range("--seeds", seeds), village, folder)
-        rows = fly_all(missions, jobs, console)
+        try:
+            rows = fly_all(missions, jobs, console)
+        except KeyboardInterrupt:
+            sys.stderr.write("stopped by hand; finished flights are kept, run again to go on\n")
+            raise typer.Exit(STOPPED) from None
         if out is not None:
             _write_rows(out / "missions.csv", rows)
     wide = Console(width=max(console.width, _TABLE_WIDTH))
@@ -284,9 +239,6 @@ def _run(command: Callable[[], Any]) -> int:
     except InputError as error:
         sys.stderr.write(f"error: {error}\n")
         return BAD_INPUT
-    except StoppedError:
-        sys.stderr.write("stopped by hand; finished flights are kept, run again to go on\n")
-        return STOPPED
     return CLEAN
 
 

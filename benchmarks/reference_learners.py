@@ -22,7 +22,7 @@ from uas_coverage_agents.reference.settings import Reference, reference_named, r
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.flying import flown
-from uas_coverage_env.runner import opened
+from uas_coverage_env.runner.store import opened
 from uas_coverage_env.tasks import LEVELS, Score
 from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
 

@@ -18,9 +18,8 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from datetime import UTC, datetime
-from multiprocessing import get_context
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated
 
@@ -33,6 +32,7 @@ from robustness_rows.store import Store
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.hashing import source_hash
+from uas_coverage_env.runner.jobs import Job, Workers
 
 ROOT = Path(__file__).parents[1]
 STOPPED = 130
@@ -57,20 +57,11 @@ def try_all(
         jobs: Processes.
         until: `time.monotonic` after which no trial begins.
     """
-    waiting = list(reversed(work))
-    under_way: dict[Future[Result], tuple[Store, Trial]] = {}
-    # threads and compiled code do not survive a fork
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        while True:
-            while waiting and len(under_way) < jobs and time.monotonic() < until:
-                store, trial = waiting.pop()
-                under_way[pool.submit(tried, trial)] = store, trial
-            if not under_way:
-                return
-            done, _ = wait(under_way, return_when=FIRST_COMPLETED)
-            for future in done:
-                store, trial = under_way.pop(future)
-                yield store, trial, future.result()
+    places = {f"{n}": one for n, one in enumerate(work)}
+    trials = (Job(key, tried, (trial,)) for key, (_, trial) in places.items())
+    with Workers(jobs) as workers:
+        for job, result in workers.run(takewhile(lambda _: time.monotonic() < until, trials)):
+            yield *places[job.key], result
 
 
 def make(

@@ -21,10 +21,8 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise, product
-from multiprocessing import get_context
 from typing import Annotated, Protocol
 
 import numpy as np
@@ -38,6 +36,7 @@ from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
 from uas_coverage_env import MissionBrief, Scenario
 from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.runner.jobs import Job, Workers
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import Command, SwarmState
@@ -249,10 +248,14 @@ def main(
     bounds = np.linspace(0, missions, min(jobs * 4, missions) + 1).astype(int) + FIRST_SEED
     shares = [range(a, b) for a, b in pairwise(bounds.tolist())]
     tallies = {case: Tally() for case in cases}
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        work = [(case, pool.submit(_fly_many, case, s, steps)) for case in cases for s in shares]
-        for case, future in work:
-            tallies[case].add(future.result())
+    with Workers(jobs) as workers:
+        work = (
+            Job(f"{case} {share}", _fly_many, (case, share, steps))
+            for case in cases
+            for share in shares
+        )
+        for job, tally in workers.run(work):
+            tallies[job.arguments[0]].add(tally)
     console = Console()
     console.width = max(console.width, 170)
     console.print(_table(tallies))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.row import FAILED, FLOWN, TIMES
-from uas_coverage_env.runner import rows_in
+from uas_coverage_env.runner.store import rows_in
 
 
 def row(scenario="a", label="p", seed=0, **changes) -> Row:

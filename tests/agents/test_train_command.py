@@ -28,7 +28,7 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import evaluate
 from uas_coverage_env.leaderboard import Row
-from uas_coverage_env.runner import opened, rows_in
+from uas_coverage_env.runner.store import opened, rows_in
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
 ASSISTED = {"return_mode": True, "safety_filter": True}

@@ -95,6 +95,13 @@ def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
         (["run", "village", "--seed", "-1"], "--seed"),
         (["run", "village", "--seed", str(SEEDS)], "--seed"),
         (["planner", "demonstrate", "village", "--seed", str(SEEDS), "--out", "shown"], "--seed"),
+        (
+            [
+                *("compare", "--scenarios", "village", "--planners", "hover"),
+                *("--vary", "climb=3,4", "--out", "front"),
+            ],
+            "'climb'; allowed: climb_m",
+        ),
         (["train", "ppo", "--seed", str(2**32)], "--seed"),
         (["run", "village", "--speed", "9"], "--speed"),
         (["run"], "SCENARIO"),

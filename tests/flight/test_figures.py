@@ -15,6 +15,7 @@ from small_worlds import meadow
 from uas_coverage_env.autopilot.guidance import steer
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Figure, Flight, figures, rollout
+from uas_coverage_env.flight.figure import FigureError
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.scores import columns
 from uas_coverage_env.world import GoTo
@@ -38,7 +39,7 @@ import json, sys
 from uas_coverage_env import Flight, evaluate
 from uas_coverage_env.cli import main
 from uas_coverage_env.leaderboard import Row
-from uas_coverage_env.runner import rows_in
+from uas_coverage_env.runner.store import rows_in
 from pathlib import Path
 
 fly = ["run", "open_field", "--planner", "hover", "--steps", "3", "--quiet", "--out", "f"]
@@ -111,7 +112,7 @@ def test_one_that_is_asked_for_by_name_says_why_it_fails(monkeypatch):
     flight = rollout(meadow(), "hover", max_steps=1)
     broken = Figure("no_m", float, lambda flight: float("nan"), "not finite")
     monkeypatch.setattr(figures, "figures", lambda: {"no_m": broken})
-    with pytest.raises(figures.FigureError, match="no_m: ValueError: it is nan"):
+    with pytest.raises(FigureError, match="no_m: ValueError: it is nan"):
         flight.figures["no_m"]
 
 

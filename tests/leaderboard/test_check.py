@@ -9,7 +9,7 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.flight import Flight, rollout
 from uas_coverage_env.leaderboard import Row, flying
 from uas_coverage_env.leaderboard.check import verdict_on
-from uas_coverage_env.runner import rows_in
+from uas_coverage_env.runner.store import rows_in
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.world import Velocity
 

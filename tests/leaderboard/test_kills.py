@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from leaderboard_rows import flights_in
 
-from uas_coverage_env.runner import STORE
+from uas_coverage_env.runner.store import STORE
 
 KILLS = 5
 PLANNERS = "hover,nearest-waypoint,random-walk"

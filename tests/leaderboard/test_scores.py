@@ -27,7 +27,8 @@ from uas_coverage_env.leaderboard.table import (
     notes,
     scenarios_cells,
 )
-from uas_coverage_env.runner import Workers, opened
+from uas_coverage_env.runner.jobs import Workers
+from uas_coverage_env.runner.store import opened
 
 
 def by_label(rows, reference="base"):

@@ -49,7 +49,7 @@ def test_a_flight_stopped_by_hand_leaves_nothing_behind(mission, monkeypatch):
 
     rollout = missions.rollout
     monkeypatch.setattr(missions, "rollout", stopped)
-    with pytest.raises(missions.StoppedError):
+    with pytest.raises(KeyboardInterrupt):
         missions.fly(mission)
     assert not mission.directory.exists()
 

@@ -8,7 +8,8 @@ import pytest
 from small_worlds import box, meadow
 
 from uas_coverage_env.flight import load_planner, rollout
-from uas_coverage_env.flight.figures import NOTHING, printed
+from uas_coverage_env.flight.figure import NOTHING
+from uas_coverage_env.flight.figures import printed
 from uas_coverage_env.flight.record import DecisionRecord, EventRecord
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.mission import MissionBrief, Range

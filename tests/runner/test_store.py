@@ -8,9 +8,8 @@ from leaderboard_rows import failed_row, row
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import Row
-from uas_coverage_env.runner import STORE, rows_in
-from uas_coverage_env.runner import opened as opened_for
-from uas_coverage_env.runner.store import difference
+from uas_coverage_env.runner.store import STORE, difference, rows_in
+from uas_coverage_env.runner.store import opened as opened_for
 
 SWEEP = {"version": "1", "seeds": "0:2"}
 

@@ -12,7 +12,8 @@ import pytest
 import some_jobs
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.runner import Job, WorkerLostError, Workers, jobs
+from uas_coverage_env.runner import jobs
+from uas_coverage_env.runner.jobs import Job, WorkerLostError, Workers
 
 HERE = Path(__file__).parent
 DEADLINE_S = 60.0

@@ -7,7 +7,7 @@ import pytest
 from leaderboard_rows import row
 
 from uas_coverage_env.leaderboard import Row
-from uas_coverage_env.runner import opened
+from uas_coverage_env.runner.store import opened
 from uas_coverage_env.tasks import scoring, seeds_of
 from uas_coverage_env.tasks.scoring import MissionScore, scored
 

@@ -17,7 +17,8 @@ from uas_coverage_env.cli.output import console
 from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_former
 from uas_coverage_env.leaderboard import PlannerSpec, Row, Sweep, scenarios_of
 from uas_coverage_env.leaderboard.row import FLOWN
-from uas_coverage_env.runner import Workers, opened
+from uas_coverage_env.runner.jobs import Workers
+from uas_coverage_env.runner.store import opened
 
 
 def demonstrate_command(

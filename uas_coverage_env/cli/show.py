@@ -23,7 +23,7 @@ from uas_coverage_env.cli.figures_of_flight import (
 from uas_coverage_env.cli.options import FlightDirectory, JsonOption, SecondFlight
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.flight.figures import NOTHING
+from uas_coverage_env.flight.figure import NOTHING
 from uas_coverage_env.flight.metrics import accomplished
 
 

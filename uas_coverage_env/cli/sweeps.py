@@ -18,7 +18,8 @@ from uas_coverage_env.leaderboard.flying import Kept, fly
 from uas_coverage_env.leaderboard.publish import failures
 from uas_coverage_env.leaderboard.row import FLOWN
 from uas_coverage_env.leaderboard.sweep import Entry, source_of
-from uas_coverage_env.runner import Job, Store, WorkerLostError, Workers
+from uas_coverage_env.runner.jobs import Job, WorkerLostError, Workers
+from uas_coverage_env.runner.store import Store
 
 
 def fly_and_keep(

@@ -3,7 +3,7 @@
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.flight.demonstrations import Demonstrations, demonstrate
 from uas_coverage_env.flight.evaluation import Evaluation, evaluate
-from uas_coverage_env.flight.figures import Figure
+from uas_coverage_env.flight.figure import Figure
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.loop import Progress, rollout
 from uas_coverage_env.flight.metrics import covered_at

@@ -23,7 +23,7 @@ from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.loop import Progress, rollout
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.runner import STORE, rows_in
+from uas_coverage_env.runner.store import STORE, rows_in
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import SwarmState

@@ -7,15 +7,8 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.flight.figures import (
-    NOTHING,
-    ByName,
-    Figure,
-    computed,
-    figures,
-    repeated,
-    rows_part,
-)
+from uas_coverage_env.flight.figure import NOTHING, ByName, Figure
+from uas_coverage_env.flight.figures import computed, figures, repeated, rows_part
 from uas_coverage_env.flight.flight import Flight, unless_stopped
 from uas_coverage_env.flight.loop import rollout
 from uas_coverage_env.flight.planner import Planner

@@ -19,9 +19,13 @@ from uas_coverage_env.leaderboard.hardware import machine, versions
 from uas_coverage_env.leaderboard.picture import drawn, leaderboard_figure
 from uas_coverage_env.leaderboard.row import FAILED, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
-from uas_coverage_env.leaderboard.table import cells, markdown, notes, scenarios_cells
-from uas_coverage_env.runner import STORE, rows_in
-from uas_coverage_env.runner.store import columns_of
+from uas_coverage_env.leaderboard.table import (
+    cells,
+    markdown,
+    notes,
+    scenarios_cells,
+)
+from uas_coverage_env.runner.store import STORE, columns_of, rows_in
 
 FLIGHTS, TABLE, SCORES = "flights.parquet", "table.md", "table.json"
 PICTURE = "coverage-energy.png"

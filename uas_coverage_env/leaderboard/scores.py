@@ -12,7 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from uas_coverage_env.files.digits import three_digits
-from uas_coverage_env.flight.figures import ByName, Figure, figures
+from uas_coverage_env.flight.figure import ByName, Figure
+from uas_coverage_env.flight.figures import figures
 from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.row import FLOWN, Row
 from uas_coverage_env.leaderboard.statistics import (

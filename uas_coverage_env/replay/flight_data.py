@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight
-from uas_coverage_env.flight.figures import NOTHING, printed
+from uas_coverage_env.flight.figure import NOTHING
+from uas_coverage_env.flight.figures import printed
 from uas_coverage_env.flight.metrics import energy_until_Wh
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.flight.seen import seen_pictures

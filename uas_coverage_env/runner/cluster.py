@@ -33,7 +33,7 @@ class Cluster:
         if not ray.is_initialized():
             local: dict[str, Any] = {}
             if "RAY_ADDRESS" not in os.environ:
-                local = {"num_cpus": count, "include_dashboard": False}
+                local = {"address": "local", "num_cpus": count, "include_dashboard": False}
             try:
                 ray.init(**local, log_to_driver=False, logging_level=logging.ERROR)
             except (ConnectionError, RuntimeError, ValueError) as error:

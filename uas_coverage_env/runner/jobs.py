@@ -93,33 +93,36 @@ class Workers:
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Any]]:
         """Do jobs; each result as soon as it is there, in no particular order.
 
-        A job whose process was killed or whose machine is gone is done again by another one. What
-        a job raises is raised here.
+        Jobs are taken as there is room for them. One whose process was killed, or whose machine is
+        gone, is done again by another one. What a job raises is raised here.
 
         Raises:
             InputError: Ray cannot be used.
             WorkerLostError: A job's process was lost each time; the other jobs were done first.
         """
-        waiting, losses, given_up = deque(jobs), Counter[str](), list[tuple[Job, Lost]]()
         if self.backend == "process" and self.count == 1:
-            for job in waiting:
+            for job in jobs:
                 yield job, job.call(*job.arguments)
             return
-        crew, under_way = self._started() if waiting else None, 0
-        if crew is None:
-            return
+        coming, again, losses = iter(jobs), deque[Job](), Counter[str]()
+        given_up: list[tuple[Job, Lost]] = []
+        under_way = 0
         try:
-            while waiting or under_way:
-                while waiting and under_way < crew.size():
-                    job = waiting.popleft()
-                    crew.begin(job, pickle.dumps((job.call, job.arguments)))
+            while True:
+                while not under_way or under_way < self._started().size():
+                    job = again.popleft() if again else next(coming, None)
+                    if job is None:
+                        break
+                    self._started().begin(job, pickle.dumps((job.call, job.arguments)))
                     under_way += 1
-                for job, result in crew.finished():
+                if not under_way:
+                    break
+                for job, result in self._started().finished():
                     under_way -= 1
                     if isinstance(result, Lost):
                         losses[job.key] += 1
                         if losses[job.key] < _MOST_LOSSES:
-                            waiting.append(job)
+                            again.append(job)
                         else:
                             given_up.append((job, result))
                         continue
@@ -129,7 +132,7 @@ class Workers:
                     yield job, value
         finally:
             if under_way:
-                crew.abandon()
+                self._started().abandon()
         if given_up:
             job, lost = given_up[0]
             raise WorkerLostError(

@@ -29,7 +29,8 @@ import numpy as np
 
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.flight import Planner, as_planner
-from uas_coverage_env.flight.figures import ByName, repeated
+from uas_coverage_env.flight.figure import ByName
+from uas_coverage_env.flight.figures import repeated
 from uas_coverage_env.flight.policy import Policy, PolicyFunction
 from uas_coverage_env.leaderboard import PlannerSpec, Row
 from uas_coverage_env.leaderboard.flying import flown

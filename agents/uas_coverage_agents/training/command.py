@@ -17,7 +17,8 @@ from uas_coverage_agents.training.published import published_names
 from uas_coverage_env.cli.options import BackendOption, JobsOption
 from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.runner import STORE, Workers, opened
+from uas_coverage_env.runner.jobs import Workers
+from uas_coverage_env.runner.store import STORE, opened
 
 if TYPE_CHECKING:
     from uas_coverage_agents.policy import Policy
