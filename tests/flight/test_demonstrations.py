@@ -118,7 +118,7 @@ def test_missions_survive_their_files_and_damage_is_named(shown, tmp_path):
 
 
 def asked(out, *more, planner="nearest-waypoint"):
-    words = ["demonstrate", "open_field", "--planner", planner, "--jobs", "1"]
+    words = ["planner", "demonstrate", "open_field", "--planner", planner, "--jobs", "1"]
     return [*words, "--out", str(out), *more]
 
 
