@@ -20,7 +20,7 @@ from test_export import random_flight
 
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.cli import main
-from uas_coverage_env.cli.sorties import keep_planned, load_planned
+from uas_coverage_env.cli.sorties import keep_planned, planned_directory
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import covered_at, rest_of
 from uas_coverage_env.flight.metrics import accomplished
@@ -99,10 +99,10 @@ def test_an_exported_track_comes_back_as_the_flight_that_it_was(plan, plan_at, t
 def test_the_log_of_one_of_several_sorties_needs_its_own_plan(plan, tmp_path):
     keep_planned([plan, plan], tmp_path, None)
     with pytest.raises(InputError, match=r"holds 2 sorties; give the one .* \S*planned_1$"):
-        load_planned(tmp_path)
-    assert load_planned(tmp_path / "planned_2") == plan
+        planned_directory(tmp_path)
+    assert Flight.load(planned_directory(tmp_path / "planned_2")) == plan
     keep_planned([plan], tmp_path, None)
-    assert load_planned(tmp_path) == plan
+    assert Flight.load(planned_directory(tmp_path)) == plan
 
 
 def test_charge_of_a_log_is_that_of_the_flight(plan):

@@ -24,6 +24,11 @@ _LEADERBOARD, _TRAINING = "leaderboard", "training"
 _FLIGHT_KINDS = ", ".join(KINDS)
 
 
+Step = Annotated[
+    int | None, typer.Option(min=0, help="The sample that the map shows; default: the last.")
+]
+
+
 def figure(
     directories: Annotated[
         list[Path],
@@ -41,9 +46,7 @@ def figure(
             "Fig. 1 to 3.",
         ),
     ],
-    step: Annotated[
-        int | None, typer.Option(min=0, help="The sample that the map shows; default: the last.")
-    ] = None,
+    step: Step = None,
     width: Annotated[
         float | None,
         typer.Option(

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -12,9 +12,13 @@ from uas_coverage_env.cli.flights import keep_flight, report_flight
 from uas_coverage_env.cli.operations import asked_place, ops
 from uas_coverage_env.cli.options import PlaceOption, ReplaceFlightOption
 from uas_coverage_env.cli.output import console, warn
-from uas_coverage_env.cli.sorties import load_planned
+from uas_coverage_env.cli.sorties import planned_directory
 from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.directory import check_directory
+
+if TYPE_CHECKING:
+    from uas_coverage_env.operations.logs.import_log import Flown
 
 
 def log(
@@ -56,8 +60,8 @@ def log(
         from uas_coverage_env.operations.flight_checks import place_of_flight
         from uas_coverage_env.operations.logs.fleet_logs import read_fleet_logs
     check_directory(out, overwrite=overwrite)
-    planned = load_planned(plan)
-    scenario = planned.scenario
+    plan = planned_directory(plan)
+    planned = Flight.load(plan)
     there = place_of_flight(planned, asked_place(place))
     numbers = _chosen("--flight", flight, planned.names)
     batteries = _chosen("--battery", battery, planned.names)
@@ -67,20 +71,25 @@ def log(
     keep_flight(made.flight, out, overwrite=overwrite)
     screen = console()
     report_flight(screen, made.flight, out)
+    screen.print(_off_path(planned, made))
+    screen.print(f"beside its plan: uas-coverage replay {plan} {out}", markup=False)
+    warn(made.notes)
+
+
+def _off_path(planned: Flight, made: "Flown") -> Table:
+    """How long each UAS flew, and how far from its planned path."""
     table = Table("UAS", "flown, s", "planned, s", "off the path, p95, m", "largest, m", box=None)
     for i, name in enumerate(planned.names):
         if name in made.off_path_m:
             off_m = made.off_path_m[name]
             table.add_row(
                 name,
-                f"{made.flight.last_sample[i] * scenario.dt_s:.0f}",
-                f"{planned.last_sample[i] * scenario.dt_s:.0f}",
+                f"{made.flight.last_sample[i] * planned.scenario.dt_s:.0f}",
+                f"{planned.last_sample[i] * planned.scenario.dt_s:.0f}",
                 f"{np.percentile(off_m, 95):.1f}",
                 f"{off_m.max():.1f}",
             )
-    screen.print(table)
-    screen.print(f"beside its plan: uas-coverage replay {plan} {out}", markup=False)
-    warn(made.notes)
+    return table
 
 
 def _chosen(option: str, texts: Sequence[str] | None, names: Sequence[str]) -> dict[str, int]:

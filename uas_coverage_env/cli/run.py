@@ -116,14 +116,13 @@ def run(asked: Asked) -> None:
     command = _Run(asked, planner, directory, screen)
     try:
         with compiling_for_flight(planner, quiet=screen.quiet):
-            flight = command.fly_and_keep(mission) if asked.sorties is None else None
-            code = command.fly_sorties(mission, asked.sorties) if asked.sorties else DONE
+            if asked.sorties is None:
+                code = command.fly_one(mission)
+            else:
+                code = command.fly_sorties(mission, asked.sorties)
     finally:
         if not any(directory.iterdir()):
             directory.rmdir()
-    if flight is not None:
-        command.report(flight)
-        code = _exit_code(flight, asked.steps)
     command.end(stopped=code == STOPPED)
     raise typer.Exit(code)
 
@@ -184,11 +183,17 @@ class _Run:
                 self.trouble.append(error)
                 return error.flight
 
-    def fly_and_keep(self, scenario: Scenario) -> Flight:
-        """Fly one mission."""
-        flight = self.fly(scenario)
+    def fly_one(self, scenario: Scenario) -> int:
+        """Fly one mission, and say what came of it; returns the exit code."""
+        flight, steps = self.fly(scenario), self.asked.steps
         keep_flight(flight, self.directory, overwrite=self.asked.overwrite)
-        return flight
+        report_flight(self.screen, flight, self.directory)
+        if self.asked.as_json:
+            typer.echo(json.dumps(data(flight, str(self.directory)), indent=2))
+        if flight.ended == "stopped":
+            return STOPPED
+        limited = flight.ended == "steps" and flight.steps == steps
+        return DONE if accomplished(flight) or limited else FAILED
 
     def fly_sorties(self, scenario: Scenario, most: int) -> int:
         """Fly sortie after sortie, and say what came of them; returns the exit code."""
@@ -197,12 +202,6 @@ class _Run:
         if self.asked.as_json:
             typer.echo((self.directory / SUMMARY).read_text(), nl=False)
         return code
-
-    def report(self, flight: Flight) -> None:
-        """Say what came of the flight."""
-        report_flight(self.screen, flight, self.directory)
-        if self.asked.as_json:
-            typer.echo(json.dumps(data(flight, str(self.directory)), indent=2))
 
     def end(self, *, stopped: bool) -> None:
         """Wait for the window to be closed, or end the command where the planner has failed."""
@@ -219,10 +218,3 @@ def free_directory(name: str) -> Path:
     first = Path("flights") / name
     candidates = (first if n == 1 else first.with_name(f"{name}-{n}") for n in count(1))
     return next(path for path in candidates if not path.exists())
-
-
-def _exit_code(flight: Flight, steps: int | None) -> int:
-    if flight.ended == "stopped":
-        return STOPPED
-    limited = flight.ended == "steps" and flight.steps == steps
-    return DONE if accomplished(flight) or limited else FAILED

@@ -67,8 +67,8 @@ def load_flights(directory: Path) -> list[Flight]:
         return [Flight.load(directory)]
     try:
         count = len(json.loads(read_text(path, _MOST_BYTES))["sorties"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: holds no list of sorties; fly the mission again") from error
+    except (ValueError, KeyError, TypeError):
+        count = 0
     if not count:
         raise InputError(f"{path}: holds no list of sorties; fly the mission again")
     return [Flight.load(directory / f"sortie_{number}") for number in range(1, count + 1)]
@@ -92,14 +92,14 @@ def keep_planned(flights: Sequence[Flight], out: Path, place: Place | None) -> N
         flight.save(out / (_PLANNED if len(flights) == 1 else f"{_PLANNED}_{number}"))
 
 
-def load_planned(directory: Path) -> Flight:
-    """The flight whose files were flown.
+def planned_directory(directory: Path) -> Path:
+    """Where the flight is whose files were flown.
 
     Args:
         directory: That of the export, or the flight directory itself.
 
     Raises:
-        InputError: It is neither, or holds several sorties.
+        InputError: It holds several sorties.
     """
     several = sorted(directory.glob(f"{_PLANNED}_*"))
     if several:
@@ -108,7 +108,7 @@ def load_planned(directory: Path) -> Flight:
             f"--plan {several[0]}"
         )
     inside = directory / _PLANNED
-    return Flight.load(inside if inside.is_dir() else directory)
+    return inside if inside.is_dir() else directory
 
 
 def _report(screen: Console, result: dict[str, Any], directory: Path) -> None:
