@@ -204,10 +204,10 @@ def test_a_new_scenario_begins_as_one_that_there_is(elsewhere, capsys):
     made = load_scenario(elsewhere / "my town.toml")
     assert made == load_scenario("town:7").model_copy(update={"name": "my_town"})
     assert main(["scenario", "new", "village", "--out", "my town.toml"]) == 2
-    assert "my town.toml: exists; give another --out or add --overwrite" in capsys.readouterr().err
+    assert "my town.toml: exists; give another file or add --overwrite" in capsys.readouterr().err
     assert main(["scenario", "new", "village", "--out", "my town.toml", "--overwrite"]) == 0
     assert main(["scenario", "new", "village", "--out", "mine.json"]) == 2
-    assert "--out mine.json: should end in .toml" in capsys.readouterr().err
+    assert "mine.json: should end in .toml" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["scenario"], ["scenario", "check"], ["planner"]])

@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from uas_coverage_env.cli.options import ReplaceFileOption
+from uas_coverage_env.cli.options import ReplaceFileOption, check_file
 from uas_coverage_env.cli.output import console, extra
-from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight

@@ -12,7 +12,7 @@ from rich.table import Table
 from uas_coverage_env.cli.options import (
     PlaceOption,
     ReplaceFileOption,
-    check_new_toml,
+    check_file,
     declared,
     scenario_name,
     taken,
@@ -152,7 +152,7 @@ def import_area(asked: AskedImport) -> None:
     """Make a scenario from drawn areas, no-fly zones and take-off places (extra `ops`)."""
     with ops():
         from uas_coverage_env.operations import make_scenario, read_drawings
-    check_new_toml(asked.out, overwrite=asked.overwrite)
+    check_file(asked.out, overwrite=asked.overwrite)
     if asked.resolution_cm is not None and asked.height_m is not None:
         raise InputError("--resolution says how high waypoints lie: leave out --height")
     options = asked.options()

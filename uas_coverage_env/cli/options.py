@@ -166,16 +166,18 @@ def typed_options(texts: Sequence[str]) -> dict[str, str]:
     return options
 
 
-def check_new_toml(out: Path, *, overwrite: bool) -> None:
-    """Make sure that a scenario or vehicle file can be written there, before it is made.
+def check_file(path: Path, suffixes: tuple[str, ...] = (".toml",), *, overwrite: bool) -> None:
+    """Make sure that a file can be written there, before what is in it is made.
 
     Raises:
-        InputError: Another kind of file, or it exists.
+        InputError: Another kind of file, or it exists, or its folder does not.
     """
-    if out.suffix != ".toml":
-        raise InputError(f"--out {out}: should end in .toml")
-    if out.exists() and not overwrite:
-        raise InputError(f"{out}: exists; give another --out or add --overwrite")
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: should end in {' or '.join(suffixes)}")
+    if path.exists() and not overwrite:
+        raise InputError(f"{path}: exists; give another file or add --overwrite")
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent}: is no folder; make it first")
 
 
 def scenario_name(path: Path) -> str:

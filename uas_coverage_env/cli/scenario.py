@@ -14,7 +14,7 @@ from rich.table import Table
 from uas_coverage_env.cli.options import (
     ReplaceFileOption,
     ScenarioArgument,
-    check_new_toml,
+    check_file,
     scenario_name,
 )
 from uas_coverage_env.cli.output import console, loaded, warn
@@ -116,7 +116,7 @@ def new(
     `scenario new town:7 --out mine.toml` has the town that is drawn from the seed 7; its keys are
     in docs/scenario_keys.md, and `scenario check` validates what becomes of it.
     """
-    check_new_toml(out, overwrite=overwrite)
+    check_file(out, overwrite=overwrite)
     mission = load_scenario(scenario).model_copy(update={"name": scenario_name(out)})
     mission.to_file(out)
     said = f"scenario in {out}; to draw it: uas-coverage scenario check {out}"
@@ -140,7 +140,7 @@ def resume(
     overwrite: ReplaceFileOption = False,
 ) -> None:
     """Write the scenario of what a flight has left to cover."""
-    check_new_toml(out, overwrite=overwrite)
+    check_file(out, overwrite=overwrite)
     flight = Flight.load(directory)
     rest = rest_of(flight, from_here=from_here)
     write_atomically(out, rest.file_text().encode())

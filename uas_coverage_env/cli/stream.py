@@ -7,9 +7,8 @@ from typing import Annotated
 import typer
 
 from uas_coverage_env.cli.operations import asked_place, ops
-from uas_coverage_env.cli.options import FlightDirectory, PlaceOption, declared, taken
+from uas_coverage_env.cli.options import FlightDirectory, PlaceOption, check_file, declared, taken
 from uas_coverage_env.cli.output import FAILED, console
-from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight

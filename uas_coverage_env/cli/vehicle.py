@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from uas_coverage_env.cli.options import ReplaceFileOption, check_new_toml, declared
+from uas_coverage_env.cli.options import ReplaceFileOption, check_file, declared
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError, parse
@@ -92,7 +92,7 @@ class Asked:
 @declared
 def new(asked: Asked) -> None:
     """Make a vehicle file from data-sheet figures and print the assumptions."""
-    check_new_toml(asked.out, overwrite=asked.overwrite)
+    check_file(asked.out, overwrite=asked.overwrite)
     diameter_in, pitch_in = _propeller(asked.propeller_in)
     known = {name: value for name, value in vars(asked).items() if name in DataSheet.model_fields}
     known |= {
