@@ -105,7 +105,7 @@ def test_a_propeller_may_be_its_diameter_alone(capsys):
         ({"propeller_in": "10-4.5"}, "--propeller-in '10-4.5': should be DIAMETERxPITCH"),
         ({"hover_minutes": "60"}, "hover_minutes 60 leaves"),
         ({"out": "mine.txt"}, "mine.txt: should end in .toml"),
-        ({"out": "nowhere/mine.toml"}, "nowhere/mine.toml: cannot be read or written"),
+        ({"out": "nowhere/mine.toml"}, "nowhere: is no folder; make it first"),
     ],
 )
 def test_a_mistake_is_one_line_and_no_file(changes, message, elsewhere, capsys):
