@@ -99,7 +99,7 @@ def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
                 *("compare", "--scenarios", "village", "--planners", "hover"),
                 *("--vary", "climb=3,4", "--out", "front"),
             ],
-            "'climb'; allowed: climb_m",
+            "'climb'",
         ),
         (["train", "ppo", "--seed", str(2**32)], "--seed"),
         (["run", "village", "--speed", "9"], "--speed"),
