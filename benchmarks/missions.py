@@ -34,7 +34,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import describe_planners
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.flight.registry import options_of
 from uas_coverage_env.independent_check import BadFlightError, check
 from uas_coverage_env.leaderboard import seed_range

@@ -32,7 +32,7 @@ from uas_coverage_agents.waypoint.sub_environments import (
 from uas_coverage_agents.waypoint.team import ENERGY, LEFT, LOST_UAS, NO_UAS, NOT_HOME, TIME
 
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.flight.metrics import coverage, energy_Wh, home, percentiles
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import sample_scenario

@@ -1,6 +1,7 @@
 """Tables of the pages that say what the code says: spaces, scenario files, planners.
 
-    python docs/tables.py            renew them, and `scenario.schema.json`
+    python docs/tables.py            renew them, `scenario.schema.json`, and what the docstrings of
+                                     the environments say of their settings
     python docs/tables.py --check    name the pages that are stale, and exit 1 where there are any
 
 Tables are committed, so that a code host shows them too. They stand in any page of `docs/`, and
@@ -14,7 +15,6 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,19 +23,23 @@ from families_picture import families_table
 from gymnasium import spaces
 
 from uas_coverage_env import load_scenario, uas_coverage_v0
-from uas_coverage_env.env import CoverageParallelEnv, CoverageSwarmEnv, CoverageVectorEnv
-from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
-from uas_coverage_env.env.observation import (
-    OBSERVATION,
-    OBSERVATION_SIZE,
-    full_state,
-    grid,
-    layout_table,
-    local,
+from uas_coverage_env.env import (
+    CoverageBatch,
+    CoverageParallelEnv,
+    CoverageSwarmEnv,
+    CoverageVectorEnv,
 )
-from uas_coverage_env.env.rewards import rewards_table
-from uas_coverage_env.env.screen import RENDER_MODES
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.actions import ACTIONS, HOME_CHOICE
+from uas_coverage_env.env.actions.given import actions_of
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
+from uas_coverage_env.env.api.aec import in_turns
+from uas_coverage_env.env.api.documentation import with_settings_written_out
+from uas_coverage_env.env.batch.memory import FINAL, LANES
+from uas_coverage_env.env.episode.memory import LEARNERS
+from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE, full_state, grid, local
+from uas_coverage_env.env.observation.layout import layout_table
+from uas_coverage_env.env.rendering.screen import RENDER_MODES
+from uas_coverage_env.env.rewards.terms import rewards_table
 from uas_coverage_env.flight import Why, figures
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.leaderboard.scores import columns
@@ -193,19 +197,13 @@ def arguments() -> str:
     """The arguments of the environment as a table, with their defaults."""
     text = docstring_section("Arguments")()
     meanings = dict(re.findall(r"^(\w+): (.*(?:\n +.*)*)", text, re.MULTILINE))
-    parameters = inspect.signature(CoverageParallelEnv.__init__).parameters.values()
-    defaults = {
-        **{parameter.name: parameter.default for parameter in parameters},
-        **{field.name: field.default for field in fields(MissionSettings)},
-    }
+    parameters = inspect.signature(CoverageParallelEnv).parameters.values()
+    defaults = {parameter.name: parameter.default for parameter in parameters}
     rows = [
-        (f"`{name}`", f"`{_NAMED.get(name, repr(defaults[name]))}`", " ".join(meaning.split()))
+        (f"`{name}`", f"`{defaults[name]!r}`", " ".join(meaning.split()))
         for name, meaning in meanings.items()
     ]
     return table(("argument", "default", "meaning"), rows)
-
-
-_NAMED = {"observation": "OBSERVATION", "reward": "REWARD"}
 
 
 def scenario_fields() -> str:
@@ -382,7 +380,24 @@ def of_operations(room: str, name: str) -> Callable[[], str]:
     return made
 
 
+def batch_arrays() -> str:
+    """The arrays of a batch: from the declarations, and what is said below each field there."""
+    places = ((LANES, "batch.lanes"), (LEARNERS, "batch.learners"), (FINAL, "batch.missions.final"))
+    rows = []
+    for memory, place in places:
+        text = inspect.getsource(memory.declaration)
+        said = dict(re.findall(r'^    (\w+): Annotated.*?\n    """(.*?)"""', text, re.M | re.S))
+        lanes = () if memory is LANES or memory is FINAL else ("L",)
+        for field in memory.fields:
+            axes = ", ".join(str(axis) for axis in (*lanes, *field.axes))
+            kind = "record" if field.dtype.names else str(field.dtype)
+            meaning = " ".join(said.get(field.name, "").split())
+            rows.append((f"`{place}.{field.name}`", f"({axes})", kind, meaning))
+    return table(("array", "shape", "dtype", "meaning"), rows)
+
+
 PARTS: dict[str, Callable[[], str]] = {
+    "batch_arrays": batch_arrays,
     "environments": environments,
     "environment_summary": environment_summary,
     "observation_groups": observation_groups,
@@ -441,8 +456,14 @@ def renewed_files() -> dict[Path, str]:
         text = page.read_text(encoding="utf-8")
         if "<!-- generated: " in text:
             files[page] = renewed(text)
+    for module in _SAY_SETTINGS:
+        source = Path(inspect.getfile(module))
+        files[source] = with_settings_written_out(source.read_text(encoding="utf-8"))
     return {**files, SCHEMA: json.dumps(scenario_schema(), indent=2, ensure_ascii=False) + "\n"}
 
+
+_SAY_SETTINGS = (CoverageParallelEnv, CoverageSwarmEnv, CoverageVectorEnv, CoverageBatch, in_turns)
+"""In the files of these are docstrings that name all settings."""
 
 _READMES = ("README.md", "baselines/README.md", "agents/README.md", "benchmarks/README.md")
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
-from uas_coverage_env.geometry import ConvexPolytope, cylinder_clearance, segment_clearance
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
 from uas_coverage_env.independent_check.distances import (
     cylinder_distance,
     hull_distance,

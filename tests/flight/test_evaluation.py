@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from uas_coverage_env import InputError, as_planner, evaluate, load_planner, rollout
-from uas_coverage_env.env import REWARD_TERMS, CoverageParallelEnv
+from uas_coverage_env.env import CoverageParallelEnv
+from uas_coverage_env.env.rewards.terms import REWARD_TERMS
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.metrics import energy_Wh, episode_return, reward_sums
 from uas_coverage_env.scenario import generate_scenario

@@ -144,7 +144,7 @@ def test_ctrl_c_while_a_sortie_is_written_ends_the_sorties(mission, tmp_path, mo
     mission.to_file(tmp_path / "mission.toml")
     out = tmp_path / "out"
     command = ["run", str(tmp_path / "mission.toml"), "--planner", "nearest-waypoint"]
-    assert main([*command, "--sorties", "9", "--out", str(out)]) == 1
+    assert main([*command, "--sorties", "9", "--out", str(out)]) == 130
     result = json.loads((out / "sorties.json").read_text())
     assert result["ended"] == "stopped"
     assert len(result["sorties"]) == 1

@@ -178,7 +178,20 @@ def test_flights_are_a_parquet_file_too_where_that_is_asked_for(
 
 def test_the_folder_of_another_command_is_refused(yard, capsys):
     assert (
-        main(["demonstrate", str(yard), "--planner", "hover", "--jobs", "1", "--out", "mine"]) == 0
+        main(
+            [
+                "planner",
+                "demonstrate",
+                str(yard),
+                "--planner",
+                "hover",
+                "--jobs",
+                "1",
+                "--out",
+                "mine",
+            ]
+        )
+        == 0
     )
     capsys.readouterr()
     assert compare(yard, out="mine") == 2

@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 from lively_missions import with_balloon
-from uas_coverage_baselines.milp_mpc.solvers import Solution, SolveStatus, highs
-from uas_coverage_baselines.milp_mpc.solvers.interface import confirmed
+from uas_coverage_baselines.milp_mpc.solvers import highs
+from uas_coverage_baselines.milp_mpc.solvers.interface import Solution, SolveStatus, confirmed
 
 from uas_coverage_env import generate_scenario, independent_check, load_planner, rollout
 

@@ -82,7 +82,7 @@ def test_the_shipped_town_is_what_import_makes_of_it():
 
 def test_the_check_of_a_scenario_says_where_it_is(capsys):
     imported("karhula")
-    assert main(["scenarios", "check", "out.toml"]) == 0
+    assert main(["scenario", "check", "out.toml"]) == 0
     assert "place      60.5246000, 26.9467500, 0 m above sea level\n" in capsys.readouterr().out
 
 

@@ -6,7 +6,7 @@ from small_worlds import meadow, waypoint
 
 pytest.importorskip("pyproj")
 
-from uas_coverage_baselines.by_legs import LegFollower
+from uas_coverage_baselines.by_legs.follower import LegFollower
 
 from uas_coverage_env import rollout
 from uas_coverage_env.operations import ExportOptions, make_export

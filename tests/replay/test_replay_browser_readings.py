@@ -33,7 +33,7 @@ from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.replay import write_replay
 from uas_coverage_env.replay.reach_data import reach
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 pytestmark = needs_chromium
 

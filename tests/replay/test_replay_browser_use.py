@@ -32,7 +32,7 @@ from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.replay import write_replay
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 pytestmark = needs_chromium
 

@@ -16,7 +16,7 @@ from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.replay.flight_data import flight_data
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.replay.safety_data import FAR_M, floors_m, rooms
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 
 def marks(flight, kind):

@@ -179,6 +179,7 @@ def test_the_folder_of_another_command_and_scores_of_0_3_0_are_refused(tmp_path,
     assert (
         main(
             [
+                "planner",
                 "demonstrate",
                 "open_field",
                 "--planner",

@@ -13,7 +13,7 @@ from uas_coverage_env.flight.metrics import accomplished, energy_Wh, fallback_re
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX
+from uas_coverage_env.vehicle.layout import DOD, VX
 
 QUICK = {"orders": 1, "moves": 20_000, "programs": 40, "idle_work": 0}
 TWO = ((100.0, 100.0, -1.0), (112.0, 100.0, -1.0))

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -12,11 +13,13 @@ from rich.progress import Progress as ProgressBar
 
 from uas_coverage_env.cli.options import (
     BackendOption,
+    DynamicsOption,
     JobsOption,
     OverwriteOption,
     command_line,
+    declared,
 )
-from uas_coverage_env.cli.output import console, one_line
+from uas_coverage_env.cli.output import console, warn
 from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_others
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.strict_toml import InputError
@@ -39,7 +42,6 @@ from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.runner.jobs import WorkerLostError, Workers
 from uas_coverage_env.runner.store import Store, opened, rows_in
 from uas_coverage_env.scenario import Scenario, warnings
-from uas_coverage_env.simulation import Dynamics
 
 _REFERENCE = "nearest-waypoint"
 _MOST_FLIGHTS = 1_000_000
@@ -59,7 +61,7 @@ Planners = Annotated[
     list[str],
     typer.Option(
         metavar="NAME,...",
-        help="Names (see `planners`) or MODULE:CLASS; LABEL=NAME adds one with other options.",
+        help="Names (see `planner list`) or MODULE:CLASS; LABEL=NAME adds one with other options.",
     ),
 ]
 Out = Annotated[Path, typer.Option(help="Directory of the sweep; resumed if it exists.")]
@@ -87,7 +89,6 @@ Reference = Annotated[
 Filter = Annotated[
     bool, typer.Option("--filter", help="Switch the safety filter on for all planners.")
 ]
-Plant = Annotated[Dynamics, typer.Option(help="The paper's linear model, or 6-DOF, exact power.")]
 Check = Annotated[
     bool,
     typer.Option(
@@ -111,25 +112,31 @@ NoBounds = Annotated[
 ]
 
 
-def compare(
-    context: typer.Context,
-    scenarios: Scenarios,
-    planners: Planners,
-    out: Out,
-    seeds: Seeds = "0:20",
-    option: Options = None,
-    vary: Vary = None,
-    reference: Reference = None,
-    safety_filter: Filter = False,
-    dynamics: Plant = "lpv",
-    check: Check = False,
-    backend: BackendOption = "process",
-    jobs: JobsOption = None,
-    reuse: Reuse = None,
-    overwrite: OverwriteOption = False,
-    with_parquet: Parquet = False,
-    no_bounds: NoBounds = False,
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What is asked of `compare`; each field is a parameter of the command."""
+
+    context: typer.Context
+    scenarios: Scenarios
+    planners: Planners
+    out: Out
+    seeds: Seeds = "0:20"
+    option: Options = None
+    vary: Vary = None
+    reference: Reference = None
+    safety_filter: Filter = False
+    dynamics: DynamicsOption = "lpv"
+    check: Check = False
+    backend: BackendOption = "process"
+    jobs: JobsOption = None
+    reuse: Reuse = None
+    overwrite: OverwriteOption = False
+    with_parquet: Parquet = False
+    no_bounds: NoBounds = False
+
+
+@declared
+def compare(asked: Asked) -> None:
     """Fly every planner on every scenario with every seed, and compare them.
 
     Ctrl-C or a kill loses no finished flight: the same command goes on. Decision times are those
@@ -137,37 +144,38 @@ def compare(
     were flown, 1 where one failed (a planner refused the scenario or crashed), the check disagrees
     with one, or the sweep was stopped.
     """
-    specs = planner_specs_of(planners, option or (), vary or ())
-    flown = scenarios_of(scenarios)
-    sweep = Sweep(flown, specs, seed_range("--seeds", seeds), dynamics, safety_filter)
-    reference = _reference(reference, list(sweep.planners))
+    specs = planner_specs_of(asked.planners, asked.option or (), asked.vary or ())
+    flown = scenarios_of(asked.scenarios)
+    seeds = seed_range("--seeds", asked.seeds)
+    sweep = Sweep(flown, specs, seeds, asked.dynamics, asked.safety_filter)
+    reference = _reference(asked.reference, list(sweep.planners))
     entries, screen = _entries(sweep), console()
-    others = [row for directory in reuse or () for row in rows_in(directory, Row)]
-    if with_parquet:
+    others = [row for directory in asked.reuse or () for row in rows_in(directory, Row)]
+    if asked.with_parquet:
         parquet(())  # what is not installed is said before anything is flown
-    asked = {"command": "compare", **sweep.description()}
+    described = {"command": "compare", **sweep.description()}
     with (
-        Workers(jobs, backend) as workers,
-        opened(out, asked, Row, overwrite=overwrite) as store,
+        Workers(asked.jobs, asked.backend) as workers,
+        opened(asked.out, described, Row, overwrite=asked.overwrite) as store,
     ):
         refuse_others(store, entries)
         _take(others, entries, store)
-        kept = "flight" if vary else "row"
-        trouble = fly_and_keep(entries, store, workers, screen, kept, check=check)
+        kept = "flight" if asked.vary else "row"
+        trouble = fly_and_keep(entries, store, workers, screen, kept, check=asked.check)
         rows = store.rows()
-        skipped = no_bounds or trouble is not None or not rows
+        skipped = asked.no_bounds or trouble is not None or not rows
         bounds = {} if skipped else bounds_shown(rows, flown, screen, workers)
     if not rows:
         sys.stderr.write("error: nothing was flown\n")
         end_with(rows, trouble)
-    fronts = _fronts(rows, flown, varied_keys(vary or ()), bounds)
-    command = command_line(context, leave_out=("reuse", "overwrite"))
+    fronts = _fronts(rows, flown, varied_keys(asked.vary or ()), bounds)
+    command = command_line(asked.context, leave_out=("reuse", "overwrite"))
     comparison = Comparison.of(rows, len(entries), reference, command, str(workers), bounds, fronts)
-    names = comparison.write(out)
-    if with_parquet:
-        write_files(out, {FLIGHTS: parquet(rows)})
+    names = comparison.write(asked.out)
+    if asked.with_parquet:
+        write_files(asked.out, {FLIGHTS: parquet(rows)})
         names.append(FLIGHTS)
-    _report(screen, comparison, out, names)
+    _report(screen, comparison, asked.out, names)
     end_with(rows, trouble)
 
 
@@ -179,8 +187,7 @@ def _entries(sweep: Sweep) -> list[Entry]:
             f"give fewer, at most {_MOST_FLIGHTS}"
         )
     for name, scenario in sweep.scenarios.items():
-        for warning in warnings(scenario):
-            sys.stderr.write(f"warning: {name}: {one_line(warning)}\n")
+        warn(f"{name}: {warning}" for warning in warnings(scenario))
     return list(sweep.entries())
 
 

@@ -15,11 +15,11 @@ from uas_coverage_env.cli.figures_of_flight import (
 )
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.figures import summary
-from uas_coverage_env.flight.interruption import interruptions_noted
 from uas_coverage_env.flight.metrics import (
     accomplished,
 )
 from uas_coverage_env.flight.picture import draw_flight
+from uas_coverage_env.interruptions import signals_noted
 
 
 def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> bool:
@@ -28,7 +28,7 @@ def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> bool:
     Returns:
         Whether one has come.
     """
-    with interruptions_noted() as interrupted:
+    with signals_noted() as interrupted:
         flight.save(directory, overwrite=overwrite)
         draw_flight(flight, directory / "map.png")
         return interrupted()

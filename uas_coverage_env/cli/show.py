@@ -4,7 +4,6 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -21,6 +20,7 @@ from uas_coverage_env.cli.figures_of_flight import (
     of_log,
     verdict,
 )
+from uas_coverage_env.cli.options import FlightDirectory, JsonOption, SecondFlight
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.figure import NOTHING
@@ -28,10 +28,8 @@ from uas_coverage_env.flight.metrics import accomplished
 
 
 def show(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
-    other: Annotated[
-        Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")
-    ] = None,
+    directory: FlightDirectory,
+    other: SecondFlight = None,
     bound: Annotated[
         bool,
         typer.Option(
@@ -39,7 +37,7 @@ def show(
             help="Beside the least energy that the mission takes (10 to 30 s of processor time).",
         ),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the figures of a flight, or of two side by side.
 

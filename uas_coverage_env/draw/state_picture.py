@@ -13,9 +13,10 @@ from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.draw.labels import Box, overlap, short_name
 from uas_coverage_env.draw.terrain import terrain
 from uas_coverage_env.draw.text import fitted, width_of, write
+from uas_coverage_env.entities.state import FLYING, LANDED, STATUS_NAMES
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, Z
-from uas_coverage_env.world import FLYING, LANDED, STATUS_NAMES, SwarmState
+from uas_coverage_env.vehicle.layout import DOD, Z
+from uas_coverage_env.world import SwarmState
 
 if TYPE_CHECKING:
     from PIL.Image import Image

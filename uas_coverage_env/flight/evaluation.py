@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.flight.figure import NOTHING, ByName, Figure
 from uas_coverage_env.flight.figures import computed, figures, repeated, rows_part
-from uas_coverage_env.flight.flight import Flight
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import Flight, unless_stopped
 from uas_coverage_env.flight.loop import rollout
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.flight.policy import as_planner
 from uas_coverage_env.flight.registry import load_planner
-from uas_coverage_env.scenario import MissionSource, ScenarioLike
+from uas_coverage_env.scenario import MissionSource
+from uas_coverage_env.scenario.source import ScenarioLike
 
 
 @dataclass(frozen=True)

@@ -33,3 +33,14 @@ class Flight(FlightRecord):
             InputError: A file is missing or was damaged.
         """
         return cls(**read_flight(Path(directory)))
+
+
+def unless_stopped(flight: Flight) -> Flight:
+    """The same flight, if it came to its end: half a flight says nothing of its planner.
+
+    Raises:
+        KeyboardInterrupt: It was stopped by hand.
+    """
+    if flight.ended == "stopped":
+        raise KeyboardInterrupt
+    return flight

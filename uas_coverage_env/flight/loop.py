@@ -13,26 +13,31 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
-from uas_coverage_env.env.meter import RewardMeter
+from uas_coverage_env.entities.codes import DynamicsName
+from uas_coverage_env.entities.commands import pack
+from uas_coverage_env.entities.state import FLYING, LANDED
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
-from uas_coverage_env.features import Feature
+from uas_coverage_env.features import MissionFeature
 from uas_coverage_env.features.of_scenario import features_of
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
-from uas_coverage_env.flight.interruption import interruptions_noted
 from uas_coverage_env.flight.left_open import left_open
 from uas_coverage_env.flight.log import FlightLog, Taken
 from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
-from uas_coverage_env.mission import MissionBrief, Relaunch
+from uas_coverage_env.interruptions import signals_noted
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.relaunch import Relaunch
 from uas_coverage_env.plugins.installed import version_of
 from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.simulation import Dynamics, World
-from uas_coverage_env.vehicle import Z
-from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Velocity, pack
+from uas_coverage_env.simulation import World
+from uas_coverage_env.vehicle.layout import Z
+from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 from uas_coverage_env.world.packs import swaps_alone
 
 _RECORDED_PACKAGES = (
@@ -66,11 +71,11 @@ def rollout(
     planner: Planner | str,
     seed: int = 0,
     *,
-    dynamics: Dynamics = "lpv",
+    dynamics: DynamicsName = "lpv",
     return_mode: bool | None = None,
     safety_filter: bool | None = None,
     max_steps: int | None = None,
-    disturbances: Sequence[Feature] | None = None,
+    disturbances: Sequence[MissionFeature] | None = None,
     reward: Sequence[RewardTerm] = REWARD,
     reward_weights: Mapping[str, float] | None = None,
     on_step: Callable[[Progress], object] | None = None,
@@ -137,7 +142,10 @@ def rollout(
             judges_wrenches=getattr(planner, "is_learner", False),
             seed=seed,
         )
-        meter = RewardMeter(world, reward, reward_weights) if reward or reward_weights else None
+        meter = None
+        if reward or reward_weights:
+            paid = MissionSettings(reward=tuple(reward), reward_weights=reward_weights)
+            meter = MissionInterface(world, paid)
         _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
@@ -167,7 +175,7 @@ def rollout(
 
     ended = "stopped"
     # the flight up to there is valid
-    with contextlib.suppress(KeyboardInterrupt), interruptions_noted() as interrupted:
+    with contextlib.suppress(KeyboardInterrupt), signals_noted() as interrupted:
 
         def stops() -> bool:
             return interrupted() or (should_stop is not None and should_stop())
@@ -188,7 +196,7 @@ def _with_reasons(flight: Flight, planner: Planner) -> Flight:
     return dataclasses.replace(flight, left_open=left_open(flight, said))
 
 
-def _is_uncertain(scenario: Scenario, disturbances: Sequence[Feature] | None) -> bool:
+def _is_uncertain(scenario: Scenario, disturbances: Sequence[MissionFeature] | None) -> bool:
     """Whether anything may push back."""
     if disturbances is not None:
         return bool(features_of(scenario, disturbances))
@@ -196,7 +204,7 @@ def _is_uncertain(scenario: Scenario, disturbances: Sequence[Feature] | None) ->
 
 
 def _make_ready(
-    world: World, meter: RewardMeter | None, planner: Planner, brief: MissionBrief, seed: int
+    world: World, meter: MissionInterface | None, planner: Planner, brief: MissionBrief, seed: int
 ) -> None:
     """Compile what world and planner begin with, then put both at the start."""
     state = world.swarm_state()
@@ -206,7 +214,7 @@ def _make_ready(
     packed = pack(stay, state.names, state.active, len(state.uncovered))
     outcome = _stepped(world, packed)
     if meter is not None:
-        meter.terms(packed, outcome)
+        meter.reward_terms(packed, outcome)
     world.reset()
     warm_up = getattr(planner, "warm_up", None)
     try:

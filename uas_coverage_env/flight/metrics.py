@@ -11,10 +11,10 @@ from uas_coverage_env.flight.record import LANDED, LOST, FlightRecord
 from uas_coverage_env.flight.scene_history import covered_since
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import landing, take_off
-from uas_coverage_env.vehicle import DOD, U_TH
+from uas_coverage_env.vehicle.layout import DOD, U_TH
 from uas_coverage_env.vehicle.vertical_flight import VerticalFlight
 
-_J_PER_WH = 3600.0
+_S_PER_H = 3600.0
 _NAMED = 8
 """UAS whose names are told; of more, the number."""
 _MOVED_M = 1.0
@@ -27,8 +27,11 @@ def coverage(flight: FlightRecord) -> float:
     Of those that events have dropped before they were covered none counts; of those that events
     have added, all that were added in time. One that is to be covered again counts each time.
     """
-    left = open_waypoints(flight)
-    covered = int(flight.covered[-1])
+    return covered_share(int(flight.covered[-1]), open_waypoints(flight))
+
+
+def covered_share(covered: int, left: int) -> float:
+    """Fraction of the waypoints that are covered; 1 where there is none."""
     return float(covered / (covered + left)) if covered + left else 1.0
 
 
@@ -50,8 +53,10 @@ def covered_at(flight: FlightRecord) -> NDArray[np.int64]:
 
 def energy_Wh(flight: FlightRecord) -> NDArray[np.float64]:
     """(U,) [Wh] sum over samples of voltage times current times dt."""
-    power_W = flight.voltage_V * flight.current_A
-    return power_W.sum(axis=0) * flight.scenario.dt_s / _J_PER_WH
+    each_Wh = flight.voltage_V * flight.current_A * (flight.scenario.dt_s / _S_PER_H)
+    # one after the other, as the environments add it up: equal to the last digit
+    sums_Wh: NDArray[np.float64] = np.add.accumulate(each_Wh, axis=0)
+    return sums_Wh[-1]
 
 
 def total_energy_Wh(flight: FlightRecord) -> float:
@@ -71,8 +76,13 @@ def available_Wh(scenario: Scenario) -> float:
 
 def energy_share(flight: FlightRecord) -> float | None:
     """Energy drawn over what all batteries may give; None where they may give none."""
-    available = available_Wh(flight.scenario)
-    return total_energy_Wh(flight) / available if available > 0.0 else None
+    return share_of_available(total_energy_Wh(flight), flight.scenario)
+
+
+def share_of_available(energy_Wh: float, scenario: Scenario) -> float | None:
+    """Energy over what all batteries may give; None where they may give none."""
+    available = available_Wh(scenario)
+    return energy_Wh / available if available > 0.0 else None
 
 
 def min_soc(flight: FlightRecord) -> float:
@@ -84,7 +94,7 @@ def energy_until_Wh(flight: FlightRecord) -> NDArray[np.float64]:
     """(T, U) [Wh] the same over the samples before each."""
     power_W = flight.voltage_V * flight.current_A
     until_W = np.concatenate([np.zeros_like(power_W[:1]), np.cumsum(power_W[:-1], axis=0)])
-    return until_W * flight.scenario.dt_s / _J_PER_WH
+    return until_W * flight.scenario.dt_s / _S_PER_H
 
 
 def packs_used(flight: FlightRecord) -> dict[str, int]:

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.codes import ContactKind
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.flight.of_log import OfLog
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import LIMITS, body_attitude
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import CONTACT_NAMES
+from uas_coverage_env.vehicle.attitude import body_attitude
+from uas_coverage_env.vehicle.limits import LIMITS
 
 MODES = ("covering", "transit", "return", "landed", "lost")
 COVERING, TRANSIT, RETURN, LANDED, LOST = range(len(MODES))

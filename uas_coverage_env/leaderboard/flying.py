@@ -9,7 +9,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, PlannerError, Progress, rollout
 from uas_coverage_env.flight.demonstrations import Demonstrator, written
 from uas_coverage_env.flight.directory import flight_files
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.leaderboard.check import verdict_on
 from uas_coverage_env.leaderboard.row import Row
 from uas_coverage_env.leaderboard.sweep import Entry

@@ -34,7 +34,8 @@ from uas_coverage_env.vehicle.range import (
     speeds_of,
     vertical_seconds,
 )
-from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
+from uas_coverage_env.world import build_arena
+from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, crossing, route
 
 FloatArray = NDArray[np.float64]
 _AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average

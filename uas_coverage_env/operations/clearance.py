@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.geometry import segment_clearance
+from uas_coverage_env.geometry.segments import segment_clearance
 from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]

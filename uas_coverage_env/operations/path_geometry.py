@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.geometry import nearest_on_segment
+from uas_coverage_env.geometry.nearest import nearest_on_segment
 
 FloatArray = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from uas_coverage_env.replay.runs import mode_runs
 from uas_coverage_env.replay.safety_data import floors_m, rooms
 from uas_coverage_env.replay.scene_data import scene_data
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 POSITION_M = 0.01
 PLAN_M = 0.1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.mission import MissionBrief, Range
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 
 @dataclass(frozen=True)

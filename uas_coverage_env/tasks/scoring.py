@@ -22,11 +22,12 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
+from types import SimpleNamespace
 from typing import Any, Self
 
 import numpy as np
 
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.flight import Planner, as_planner
 from uas_coverage_env.flight.figure import ByName
 from uas_coverage_env.flight.figures import repeated
@@ -38,6 +39,7 @@ from uas_coverage_env.leaderboard.statistics import Estimate, estimate
 from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.tasks.in_batch import flown_in_batches
 from uas_coverage_env.tasks.levels import level_named
 from uas_coverage_env.tasks.task import Task
 
@@ -128,10 +130,13 @@ def score(
     missions: int = 20,
     split: str = "test",
     swarm_of: int | None = None,
+    batch: int | None = None,
     on_mission: Callable[[MissionScore], object] | None = None,
     **chosen: Any,
 ) -> Score:
     """Fly the first missions of a split and score them.
+
+    The seeds of the missions, `seeds_of(split)[:missions]`, are in `Score.missions`.
 
     Args:
         planner: `random`, the name of a planner, a planner, or a policy: a function from
@@ -141,6 +146,10 @@ def score(
         missions: How many.
         split: validation or test.
         swarm_of: For a policy of the whole swarm, see `as_planner`.
+        batch: For a policy that takes the observations of many at once, (N, …), and returns N
+            actions: how many missions are flown side by side, in a fiftieth of the time. The same
+            values to the last digit, where it answers each row as it would by itself; figures that
+            a batch does not measure are None. None: missions are flown one by one.
         on_mission: Called with each mission that was flown.
         **chosen: For a policy: action, observation and so on, where they are not the level's.
 
@@ -151,9 +160,13 @@ def score(
             that is the level's affair.
     """
     task = level_named(level)
-    spec = spec_of(planner, task, swarm_of, chosen)
+    drawn = task.scenarios(split, missions)
+    if batch is None:
+        flown_one = _flown_one_by_one(spec_of(planner, task, swarm_of, chosen), task, drawn)
+    else:
+        flown_one = _flown_side_by_side(planner, task, drawn, batch, swarm_of, chosen)
     found = []
-    for mission in _flown_one_by_one(spec, task, task.scenarios(split, missions)):
+    for mission in flown_one:
         if on_mission is not None:
             on_mission(mission)
         found.append(mission)
@@ -191,7 +204,7 @@ def spec_of(
 
 def entry_of(spec: PlannerSpec, task: Task, seed: int, scenario: Scenario) -> Entry:
     """The flight of a mission of a level."""
-    limited = MissionSettings(max_cycles=task.max_cycles).limited(scenario)
+    limited = MissionSettings(max_steps=task.max_steps).limited(scenario)
     return Entry(
         limited,
         scenario_hash(limited),
@@ -213,6 +226,30 @@ def _flown_one_by_one(
         yield MissionScore.of(Row.of(entry, flown(entry), ""))
 
 
+def _flown_side_by_side(
+    policy: Any,
+    task: Task,
+    missions: Mapping[int, Scenario],
+    batch: int,
+    swarm_of: int | None,
+    chosen: Mapping[str, Any],
+) -> Iterator[MissionScore]:
+    """Missions of a level as a policy flies them, many at once."""
+    if not callable(policy) or hasattr(policy, "act"):
+        raise ValueError(
+            f"batch is {batch}, and {policy!r} is no policy; give a function from observations "
+            f"(N, …) to N actions, or leave batch out"
+        )
+    whole = isinstance(batch, int) and not isinstance(batch, bool)
+    if not whole or batch < 1:
+        raise ValueError(f"batch is {batch!r}; give a whole number from 1 on, or None")
+    measured = repeated()
+    settings = task.settings(**chosen)
+    for seed, found in flown_in_batches(policy, missions, settings, batch, swarm_of):
+        every = {name: found.get(name) for name in measured}
+        yield MissionScore(seed, mission_value(SimpleNamespace(**every)), every)
+
+
 class RandomPolicy(PolicyFunction):
     """Draws each action uniformly from the action space; the seed of a mission repeats it.
 
@@ -226,7 +263,7 @@ class RandomPolicy(PolicyFunction):
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission."""
         super().reset(brief, seed)
-        self._space = self._cockpit.actions.space()
+        self._space = self._interface.actions.space()
         self._space.seed(seed)
 
     def _drawn(self, seen: Any) -> Any:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
-from uas_coverage_agents.policy import Interval, Policy, Score
+from uas_coverage_agents.policy import Policy
+from uas_coverage_agents.policy.description import Interval, Score
 from uas_coverage_agents.policy.directory import weights_sha256
 from uas_coverage_agents.policy.planner import runner_of
 from uas_coverage_env.files.errors import PlannerError
@@ -133,7 +134,7 @@ def _measured(row: Row) -> list[float]:
     return [getattr(row, name) or 0.0 for name in _FIGURES.values()]
 
 
-def score(results: NDArray[np.float64], scenarios: str) -> Score:
+def score_of(results: NDArray[np.float64], scenarios: str) -> Score:
     """The means of `fly` with their 95 % bootstrap intervals.
 
     Args:

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from uas_coverage_env.flight.of_log import Estimate
 from uas_coverage_env.operations.logs.logged import Logged
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import VehicleParams, dod_per_s
+from uas_coverage_env.vehicle import VehicleParams
 from uas_coverage_env.vehicle.battery import steady_voltage_V
+from uas_coverage_env.vehicle.range import dod_per_s
 
 FloatArray = NDArray[np.float64]
 

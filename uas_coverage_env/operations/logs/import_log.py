@@ -23,7 +23,7 @@ from uas_coverage_env.operations.logs.logged import Logged
 from uas_coverage_env.operations.path_geometry import distances_m
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle import tilts_and_turn
+from uas_coverage_env.vehicle.attitude import tilts_and_turn
 
 PLANNER = "log"
 """Name of the planner of what was flown elsewhere."""

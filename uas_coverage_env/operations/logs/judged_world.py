@@ -12,7 +12,7 @@ from uas_coverage_env.entities.state import FLYING, LOST
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.step import MISSION, begin_step
 from uas_coverage_env.simulation.world import World
-from uas_coverage_env.vehicle import N_STATES
+from uas_coverage_env.vehicle.layout import N_STATES
 from uas_coverage_env.world.contacts import (
     check_fence_and_battery,
     check_obstacles,

@@ -46,7 +46,7 @@ def stream_flight(
         tell: Called with lines for the user.
 
     Returns:
-        How it has ended, and what was flown as a table that `import-log` reads.
+        How it has ended, and what was flown as a table that `log` reads.
 
     Raises:
         InputError: The flight, a connection or an option is wrong, or the plan needs more than the

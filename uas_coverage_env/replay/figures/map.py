@@ -30,7 +30,7 @@ from uas_coverage_env.replay.figures.style import (
     words_colour,
 )
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import PSI
+from uas_coverage_env.vehicle.layout import PSI
 
 _LEGEND_IN = 0.2
 _LEGEND_ROW_IN = 0.175

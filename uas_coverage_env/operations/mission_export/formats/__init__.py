@@ -105,7 +105,7 @@ ENDINGS: Mapping[str, tuple[str, str, str]] = {
     ".geojson": ("geojson", "maps", "the same"),
     ".csv": (
         "csv",
-        "tables, `import-log`",
+        "tables, `log`",
         "the flown samples in degrees, of which sortie they are, charge, voltage and current",
     ),
 }
