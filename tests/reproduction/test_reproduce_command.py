@@ -5,13 +5,13 @@ import json
 
 import pytest
 import typer
+from leaderboard_rows import flights_in
 from typer.testing import CliRunner
 from uas_coverage_baselines.reproduction import command, sizes, sweeps
 from uas_coverage_baselines.reproduction.published import paper_named
 
 from uas_coverage_env import Flight
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard import flights_in
 from uas_coverage_env.scenario import flood_village
 
 SOON = {"horizon": 8, "teams": 1, "deterministic": True, "threads": 1, "return_rule": "vehicle"}
