@@ -33,7 +33,7 @@ from uas_coverage_env.leaderboard import (
 )
 from uas_coverage_env.leaderboard import table as tables
 from uas_coverage_env.runner.jobs import WorkerLostError, Workers
-from uas_coverage_env.runner.store import Store, opened, rows_in
+from uas_coverage_env.runner.store import STORE, Store, opened, rows_in
 from uas_coverage_env.scenario import Scenario, warnings
 from uas_coverage_env.simulation import Dynamics
 
@@ -151,7 +151,7 @@ def compare(
         skipped = no_bounds or trouble is not None
         bounds = {} if skipped else bounds_shown(rows, sweep.scenarios, screen, workers)
     comparison = Comparison.of(rows, len(entries), reference, command, str(workers), bounds)
-    names = write(comparison, out)
+    names = [STORE, *write(comparison, out)]
     if with_parquet:
         write_files(out, {FLIGHTS: parquet(rows)})
         names.append(FLIGHTS)
