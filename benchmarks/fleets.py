@@ -14,12 +14,11 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
-from learners import MEASURED, machine, measured_cells, put
+from learners import MEASURED, flown_by, machine, measured_cells, put
 from numpy.typing import NDArray
 from uas_coverage_agents.training.scenarios import VALIDATION, town
-from uas_coverage_agents.training.score import measured
 
-from uas_coverage_env import Scenario, load_planner, rollout
+from uas_coverage_env import Scenario
 
 NAME = "fleets"
 REFERENCE = "nearest-waypoint"
@@ -67,8 +66,7 @@ def towns_of(n_uas: int, missions: int) -> list[Scenario]:
 
 def flown(name: str, towns: Sequence[Scenario]) -> NDArray[np.float64]:
     """(missions, measures) of a planner."""
-    planner = load_planner(name, PLANNERS[name])
-    return np.array([measured(rollout(scenario, planner)) for scenario in towns])
+    return flown_by(name, towns, PLANNERS[name])
 
 
 def row(n_uas: int, name: str, result: NDArray[np.float64], reference: NDArray[np.float64]) -> str:

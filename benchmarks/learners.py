@@ -18,7 +18,7 @@ import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,10 +29,12 @@ from uas_coverage_agents.training import curve, velocity_learning
 from uas_coverage_agents.training.checkpoint import CurvePoint
 from uas_coverage_agents.training.config import load_config
 from uas_coverage_agents.training.scenarios import VALIDATION, town
-from uas_coverage_agents.training.score import MEASURES, fly, interval, measured
+from uas_coverage_agents.training.score import MEASURES, Validation, fly, interval
 from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 
-from uas_coverage_env import Scenario, load_planner, rollout
+from uas_coverage_env import Scenario
+from uas_coverage_env.leaderboard import PlannerSpec
+from uas_coverage_env.runner.jobs import Workers
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "agents" / "README.md"
@@ -136,8 +138,15 @@ def untrained(study: Study) -> Policy:
 
 def nearest_waypoint(towns: Sequence[Scenario]) -> NDArray[np.float64]:
     """(missions, measures) of the simplest planner."""
-    planner = load_planner("nearest-waypoint")
-    return np.array([measured(rollout(scenario, planner)) for scenario in towns])
+    return flown_by("nearest-waypoint", towns)
+
+
+def flown_by(
+    name: str, towns: Sequence[Scenario], options: Mapping[str, str] | None = None
+) -> NDArray[np.float64]:
+    """(missions, measures) of a planner, flown by as many processes as there are cores."""
+    with Workers(None) as workers:
+        return Validation(workers).fly(PlannerSpec.named(name, name, options), towns)
 
 
 def report(

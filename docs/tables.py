@@ -340,7 +340,7 @@ def flight_figures() -> str:
     rows = [
         (
             f"`{name}`",
-            f"`{key}`" if (key := name if each.key is None else each.key) else "",
+            f"`{key}`" if (key := each.key_in_file) else "",
             each.meaning,
         )
         for name, each in FIGURES.items()

@@ -105,6 +105,7 @@ QUICK = {
     "replay/test_viewer_bundle.py": "",
     "scenario/test_event_tables.py": "",
     "scenario/test_families.py": "only test_every_centre_has_a_free_way_up",
+    "runner/test_store.py": "",
     "scenario/test_payload.py": "",
     "scenario/test_scenario_checks.py": "",
     "scenario/test_scenario_load.py": "",

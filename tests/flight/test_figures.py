@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 
+import numpy as np
 import pytest
 from numba.core import event
 from small_worlds import meadow
@@ -108,12 +109,60 @@ def test_a_figure_that_fails_is_null_and_named_and_loses_no_flight(outside):
     assert "broken_Wh" in json.loads((folder / "found.json").read_text())["failed"]
 
 
-def test_one_that_is_asked_for_by_name_says_why_it_fails(monkeypatch):
+@pytest.mark.parametrize(
+    ("kind", "value", "said"),
+    [
+        (float, float("nan"), "it is nan, which is no finite number"),
+        (float, np.float64("inf"), "it is .*inf.*, which is no finite number"),
+        (float, "12", "it is '12', which is no finite number"),
+        (int, 2.5, "it is 2.5, which is no whole number"),
+        (int, -1, "it is -1, which is no whole number"),
+        (bool, 3, "it is 3, which is no truth"),
+        (dict, {"a": np.float32(1.0)}, "TypeError: Object of type float32"),
+        (list, [float("nan")], "Out of range float values are not JSON compliant"),
+    ],
+)
+def test_one_that_no_file_could_hold_says_so(kind, value, said, monkeypatch):
     flight = rollout(meadow(), "hover", max_steps=1)
-    broken = Figure("no_m", float, lambda flight: float("nan"), "not finite")
-    monkeypatch.setattr(figures, "figures", lambda: {"no_m": broken})
-    with pytest.raises(FigureError, match="no_m: ValueError: it is nan"):
-        flight.figures["no_m"]
+    broken = Figure("mine", kind, lambda flight: value, "wrong")
+    monkeypatch.setattr(figures, "figures", lambda: {"mine": broken})
+    with pytest.raises(FigureError, match=f"mine: .*{said}"):
+        flight.figures["mine"]
+    assert figures.summary(flight)["mine"] is None
+    assert "mine" in figures.summary(flight)["failed_figures"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "kept"),
+    [
+        (float, 3, 3.0), (float, np.float32(0.5), 0.5), (int, np.int8(3), 3), (int, 4.0, 4),
+        (bool, np.True_, True), (dict, {"a": 1}, {"a": 1}), (list, (), []), (float, None, None),
+    ],
+)  # fmt: skip
+def test_what_numpy_gives_is_kept_as_plain_data(kind, value, kept):
+    found = Figure("mine", kind, lambda flight: value, "right").computed(None)
+    assert found == kept
+    assert type(found) is type(kept)
+
+
+def test_one_whose_text_fails_is_printed_with_the_reason(monkeypatch):
+    mine = Figure("mine", float, lambda flight: 1.0, "fine", text=lambda value: 1 / 0)
+    monkeypatch.setattr(figures, "figures", lambda: {"mine": mine})
+    text = figures.printed(rollout(meadow(), "hover", max_steps=1))["mine"]
+    assert text.startswith("cannot be printed: ZeroDivisionError")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"name": "my figure"}, {"name": "return"}, {"name": "_mine"}, {"kind": complex},
+        {"over": "sum"}, {"counts": "some"}, {"table": "mine"},
+    ],
+)  # fmt: skip
+def test_a_figure_that_could_stand_nowhere_is_refused(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))) as error:
+        Figure(**{"name": "mine", "kind": float, "of": len, "meaning": "", **wrong})
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -121,6 +170,7 @@ def test_one_that_is_asked_for_by_name_says_why_it_fails(monkeypatch):
     [
         (Figure("steps", int, lambda flight: 0, "again"), "there is a figure 'steps' already"),
         (Figure("x", int, lambda flight: 0, "again", key="return"), "there is a figure 'x'"),
+        (Figure("mine", int, lambda flight: 0, "", key="seed"), "there is a figure 'mine'"),
         (3, "is a int; name a Figure"),
         (ImportError("no such package"), "cannot be loaded: ImportError: no such package"),
     ],

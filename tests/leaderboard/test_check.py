@@ -46,6 +46,14 @@ def test_it_says_in_what_it_disagrees(flight, changes, said):
     assert said in verdict_on(dataclasses.replace(flight, **changes(flight)))
 
 
+def test_files_that_do_not_fit_together_are_a_disagreement(flight, tmp_path):
+    folder = flight.save(tmp_path / "flight")
+    (folder / "plan.csv").write_text("t_s,uas,n,x_m,y_m,z_m\n0,nobody,0,1,1,1\n")
+    verdict = verdict_on(flight, folder)
+    assert verdict.startswith("cannot be judged: ")
+    assert "unknown UAS 'nobody'" in verdict
+
+
 def test_a_contact_is_no_disagreement_and_events_are_not_judged(flight):
     lost = rollout(flight.scenario, Outwards())
     assert lost.violations

@@ -40,7 +40,7 @@ from uas_coverage_env.leaderboard.publish import FLIGHTS, FRONT, parquet
 from uas_coverage_env.leaderboard.row import FLOWN
 from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.runner.jobs import WorkerLostError, Workers
-from uas_coverage_env.runner.store import Store, opened, rows_in
+from uas_coverage_env.runner.store import STORE, Store, opened, rows_in
 from uas_coverage_env.scenario import Scenario, warnings
 
 _REFERENCE = "nearest-waypoint"
@@ -171,7 +171,7 @@ def compare(asked: Asked) -> None:
     fronts = _fronts(rows, flown, varied_keys(asked.vary or ()), bounds)
     command = command_line(asked.context, leave_out=("reuse", "overwrite"))
     comparison = Comparison.of(rows, len(entries), reference, command, str(workers), bounds, fronts)
-    names = comparison.write(asked.out)
+    names = [STORE, *comparison.write(asked.out)]
     if asked.with_parquet:
         write_files(asked.out, {FLIGHTS: parquet(rows)})
         names.append(FLIGHTS)

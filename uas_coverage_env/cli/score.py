@@ -68,6 +68,8 @@ def score_command(
         trouble = fly_and_keep(every, store, workers, screen)
         found = {row.key: row for row in store.rows()}
     for name, some in entries.items():
+        if not any(entry.key in found for entry in some):  # stopped before
+            continue
         flown: dict[str, list[MissionScore]] = {}
         for entry in some:
             if entry.key in found:

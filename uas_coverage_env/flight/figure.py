@@ -1,19 +1,32 @@
 """What a figure of a flight is; `figures` has them all."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from keyword import iskeyword
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight.record import FlightRecord
+from uas_coverage_env.plugins.users_code import described
 
 NOTHING = "-"
 """What is printed where there is no figure."""
 
 _UNITS = {"m": "m", "Wh": "Wh", "s": "s", "mps": "m/s", "rad": "rad", "share": "%"}
+_KINDS = {
+    bool: "truth",
+    int: "whole number from 0 to 1e12",
+    float: "finite number up to 1e12",
+    list: "list",
+    dict: "mapping",
+    str: "text",
+}
+_LARGEST = 1e12
 _SCALES = {"%": 100.0, "ms": 1000.0}
 
 Over = Literal["mean", "average", "total", "median", "least", "most"]
+Table = Literal["outcome", "effort", ""]
 Counts = Literal["all", "flown", "unharmed", "accomplished"]
 
 
@@ -23,8 +36,8 @@ class Figure:
 
     Attributes:
         name: With its unit, as in `energy_Wh`; a share, 0..1, ends in `_share`, or its unit is `%`.
-        kind: `bool`, `int` or `float`: has a column in rows and tables, too. `list`: a row has its
-            length, if `counted`. `dict` and `str` are of one flight only.
+        kind: `bool`, `int` (a count) or `float`: has a column in rows and tables, too. `list`: a
+            row has its length, if `counted`. `dict` and `str` are of one flight only.
         of: The figure of a flight; None where it has none.
         meaning: In a line, for the docs.
         heading: Over it in tables, without its unit; empty: its name in words.
@@ -58,9 +71,51 @@ class Figure:
     absent: bool | int | float | None = None
     over: Over = "mean"
     counts: Counts = "flown"
-    table: Literal["outcome", "effort", ""] = "effort"
+    table: Table = "effort"
     counted: bool = False
     repeats: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse what could not be kept under its name, or printed.
+
+        Raises:
+            ValueError: Of which attribute, and what is allowed.
+        """
+        if not self.name.isidentifier() or iskeyword(self.name) or self.name.startswith("_"):
+            raise ValueError(f"name is {self.name!r}; give one that an attribute can have")
+        choices = {"kind": _KINDS, "over": get_args(Over), "counts": get_args(Counts)}
+        for field, allowed in {**choices, "table": get_args(Table)}.items():
+            if getattr(self, field) not in allowed:
+                names = ", ".join(getattr(each, "__name__", repr(each)) for each in allowed)
+                raise ValueError(
+                    f"{field} of {self.name} is {getattr(self, field)!r}; give {names}"
+                )
+
+    def computed(self, flight: FlightRecord) -> Any:
+        """The figure of a flight, of its kind; None where the flight has none.
+
+        Raises:
+            FigureError: It cannot be computed, or is nothing that a file can hold.
+        """
+        try:
+            value = self.of(flight)
+            return None if value is None else self._kept(value)
+        except Exception as error:
+            raise FigureError(f"{self.name}: {described(error)}") from error
+
+    def _kept(self, value: Any) -> Any:
+        if self.kind not in (bool, int, float):
+            json.dumps(value, allow_nan=False)
+            return self.kind(value)
+        number = self.kind(value)
+        if number != value or (self.kind is int and number < 0) or abs(number) > _LARGEST:
+            raise ValueError(f"it is {value!r}, which is no {_KINDS[self.kind]}")
+        return number
+
+    @property
+    def key_in_file(self) -> str:
+        """Its key in `summary.json`; empty where it has none."""
+        return self.name if self.key is None else self.key
 
     @property
     def in_rows(self) -> bool:

@@ -8,7 +8,6 @@ figure is one `Figure`, here or in an installed package that names it in the ent
     CLOSEST = Figure("home_distance_m", float, distance, "from home at the end, the farthest UAS")
 """
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from functools import lru_cache
@@ -22,6 +21,9 @@ from uas_coverage_env.flight.record import FlightRecord
 from uas_coverage_env.flight.seen import seen_shares
 from uas_coverage_env.plugins.installed import entry_points
 from uas_coverage_env.plugins.users_code import described
+
+_BESIDE = ("failed_figures", "versions", "seed", "planner")
+"""Keys of `summary.json` that are no figures."""
 
 GROUP = "uas_coverage.figures"
 """Entry points: each is a `Figure`."""
@@ -37,7 +39,7 @@ class FlightFigures(Mapping[str, Any]):
         self._flight = flight
 
     def __getitem__(self, name: str) -> Any:
-        return _computed(figures()[name], self._flight)
+        return figures()[name].computed(self._flight)
 
     def __iter__(self) -> Iterator[str]:
         return iter(figures())
@@ -66,7 +68,8 @@ def _figures(installed: tuple[Any, ...]) -> Mapping[str, Figure]:
             raise InputError(f"{where}: cannot be loaded: {described(error)}") from error
         if not isinstance(figure, Figure):
             raise InputError(f"{where}: is a {type(figure).__name__}; name a Figure")
-        if figure.name in found or figure.key in _keys(found):
+        keys = {*_BESIDE, *(each.key_in_file for each in found.values())}
+        if figure.name in found or figure.key_in_file in keys - {""}:
             raise InputError(f"{where}: there is a figure {figure.name!r} already; rename it")
         found[figure.name] = figure
     return found
@@ -81,7 +84,7 @@ def computed(flight: FlightRecord) -> tuple[dict[str, Any], dict[str, str]]:
     failed: dict[str, str] = {}
     for name, figure in figures().items():
         try:
-            values[name] = _computed(figure, flight)
+            values[name] = figure.computed(flight)
         except FigureError as error:
             values[name], failed[name] = None, str(error)
     return values, failed
@@ -109,7 +112,7 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
     values, failed = computed(flight)
     result = {}
     for name, figure in figures().items():
-        key, value = name if figure.key is None else figure.key, values[name]
+        key, value = figure.key_in_file, values[name]
         if key and not (figure.optional and value is None and name not in failed):
             result[key] = value
     return {
@@ -124,28 +127,15 @@ def summary(flight: FlightRecord) -> dict[str, Any]:
 def printed(flight: FlightRecord) -> dict[str, str]:
     """The figures of a flight as a person reads them, by heading."""
     values, failed = computed(flight)
-    return {
-        figure.label: "failed" if name in failed else figure.printed(values[name])
-        for name, figure in figures().items()
-        if figure.shown
-    }
-
-
-def _keys(found: Mapping[str, Figure]) -> set[str]:
-    return {figure.key for figure in found.values() if figure.key}
-
-
-def _computed(figure: Figure, flight: FlightRecord) -> Any:
-    """The value of a figure, of its kind: what is not is no figure that a file could hold."""
-    try:
-        value = figure.of(flight)
-        if value is None:
-            return None
-        if figure.kind is float and not math.isfinite(value):
-            raise ValueError(f"it is {value}")
-        return figure.kind(value)
-    except Exception as error:
-        raise FigureError(f"{figure.name}: {described(error)}") from error
+    result = {}
+    for name, figure in figures().items():
+        if figure.shown:
+            try:
+                text = "failed" if name in failed else figure.printed(values[name])
+            except Exception as error:  # of a text of a user's own
+                text = f"cannot be printed: {described(error)}"
+            result[figure.label] = text
+    return result
 
 
 def _entries(field: str) -> Callable[[FlightRecord], list[Any] | None]:

@@ -7,3 +7,4 @@ compared with `summary.json`: `python -m uas_coverage_env.independent_check DIR`
 from uas_coverage_env.independent_check.judge import Report as Report
 from uas_coverage_env.independent_check.judge import check as check
 from uas_coverage_env.independent_check.record import BadFlightError as BadFlightError
+from uas_coverage_env.independent_check.record import NotJudgedError as NotJudgedError

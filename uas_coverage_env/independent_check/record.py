@@ -35,6 +35,10 @@ class BadFlightError(ValueError):
     """The directory is no flight, or its files do not fit together; one line."""
 
 
+class NotJudgedError(BadFlightError):
+    """Something happens in the flight that is not judged here; one line."""
+
+
 @dataclass(frozen=True)
 class Track:
     """One UAS's rows of `flight.csv`, from t = 0 to its last.
@@ -158,11 +162,11 @@ def read_record(directory: Path) -> FlightRecord:
         kind = type(error).__name__
         raise BadFlightError(f"{directory / name}: was damaged ({kind}: {reason})") from error
     if scenario.get("events"):
-        raise BadFlightError(f"{directory}: events happen in it, which are not judged here")
+        raise NotJudgedError(f"{directory}: events happen in it, which are not judged here")
     for track in tracks:
         drawn = np.flatnonzero((track.columns["current_A"] > 0.0) | track.rests)
         if len(drawn) and len(drawn) <= drawn[-1] - drawn[0]:
-            raise BadFlightError(
+            raise NotJudgedError(
                 f"{directory}: {track.name} lands and takes off again, which is not judged here"
             )
     return FlightRecord(scenario, summary, tracks, moving_m, plan, dynamics, disturbed)

@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.independent_check import BadFlightError, check
+from uas_coverage_env.independent_check import BadFlightError, NotJudgedError, check
 from uas_coverage_env.leaderboard.row import AGREES, NOT_JUDGED
 
 _PLAN_TOLERANCE_M = 1e-3
@@ -29,6 +29,8 @@ def verdict_on(flight: Flight, directory: Path | None = None) -> str:
     exact = flight.dynamics == "lpv" and not assisted and not flight.disturbances
     try:
         report = check(directory, _PLAN_TOLERANCE_M if exact else math.inf)
-    except BadFlightError as error:
+    except NotJudgedError as error:
         return f"{NOT_JUDGED}: {str(error).removeprefix(f'{directory}: ')}"
+    except BadFlightError as error:
+        return f"cannot be judged: {str(error).removeprefix(f'{directory}: ')}"
     return "; ".join(report.disagreements)[:_LONGEST] or AGREES

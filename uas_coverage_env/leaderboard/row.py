@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Self
 
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.figures import computed, figures, rows_part
 from uas_coverage_env.leaderboard.sweep import Entry
@@ -122,6 +123,11 @@ class _Flown:
         """Whether the independent checker disagrees with it."""
         return self.verdict is not None and not self.verdict.startswith((AGREES, NOT_JUDGED))
 
+
+_TAKEN = {field.name for field in dataclasses.fields(_Flown)} | set(vars(_Flown))
+for _name in figures():
+    if _name in _TAKEN:
+        raise InputError(f"figure {_name!r}: rows have something else of this name; rename it")
 
 if TYPE_CHECKING:
     Row = _Flown

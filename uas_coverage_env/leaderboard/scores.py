@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from uas_coverage_env.files.digits import three_digits
+from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight.figure import ByName, Figure
 from uas_coverage_env.flight.figures import figures
 from uas_coverage_env.leaderboard.bounds import Bounds
@@ -134,7 +135,12 @@ class Column:
 def columns() -> dict[str, Column]:
     """All columns by name: those of figures in their order, then those made of several."""
     ours = [_of_figure(each) for each in figures().values() if each.in_rows]
-    return {column.name: column for column in (*_COUNTED, *ours, *_FURTHER)}
+    found: dict[str, Column] = {}
+    for column in (*_COUNTED, *_FURTHER, *ours):
+        if found.setdefault(column.name, column) is not column:
+            raise InputError(f"two columns of a comparison are called {column.name!r}; rename one")
+    places = [column.name for column in (*_COUNTED, *ours, *_FURTHER)]
+    return {name: found[name] for name in places}
 
 
 def drawn_anew(rows: Sequence[Row]) -> Over:

@@ -3,7 +3,7 @@
 import os
 import pickle
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, Self
 
@@ -90,7 +90,7 @@ class Workers:
             return "as many flights side by side as the cluster has cores"
         return f"{self.count} flight{'' if self.count == 1 else 's'} side by side"
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Any]]:
+    def run(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Any], None, None]:
         """Do jobs; each result as soon as it is there, in no particular order.
 
         Jobs are taken as there is room for them. One whose process was killed, or whose machine is
