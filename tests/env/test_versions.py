@@ -1,5 +1,6 @@
 """A version of the environments is a set of tuples: they act everywhere, and beside the others."""
 
+import importlib
 import inspect
 import json
 import os
@@ -31,7 +32,7 @@ from uas_coverage_env.env import (
 )
 from uas_coverage_env.env.episode.settings import MissionKeywords
 from uas_coverage_env.env.report import INFOS
-from uas_coverage_env.env.versions import V0, Version
+from uas_coverage_env.env.versions import V0, VERSIONS, Version
 
 
 @kernel
@@ -217,3 +218,11 @@ def test_missions_that_have_ended_wait_where_they_rest():
     assert batch.lanes.truncated.all()
     batch.reset(mask=np.array([True, False]))
     assert batch.lanes.truncated.tolist() == [False, True]
+
+
+def test_every_version_is_registered_and_has_a_module():
+    assert [f"v{number}" for number in registration.VERSIONS] == list(VERSIONS)
+    for number, name in zip(registration.VERSIONS, VERSIONS, strict=True):
+        module = importlib.import_module(f"uas_coverage_env.uas_coverage_v{number}")
+        assert module.parallel_env.version is module.swarm_env.version is VERSIONS[name]
+        assert f"UASCoverage-{name}" in gymnasium.registry
