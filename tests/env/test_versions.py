@@ -7,6 +7,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import fields
 
 import gymnasium
 import numpy as np
@@ -30,7 +31,7 @@ from uas_coverage_env.env import (
     MissionSettings,
     RewardTerm,
 )
-from uas_coverage_env.env.episode.settings import MissionKeywords
+from uas_coverage_env.env.episode.settings import MissionKeywords, inside_name
 from uas_coverage_env.env.report import INFOS
 from uas_coverage_env.env.versions import V0, VERSIONS, Version
 
@@ -184,6 +185,11 @@ def test_every_setting_is_in_signature_and_docstring(door):
         assert parameters[name].annotation == kind
         assert f"{name}: " in text
     assert all(each.kind != each.VAR_KEYWORD for each in parameters.values())
+
+
+def test_every_setting_is_a_keyword_argument():
+    keywords = {inside_name(name) for name in MissionKeywords.__annotations__}
+    assert keywords | {"version"} == {field.name for field in fields(MissionSettings)}
 
 
 def test_the_short_way_to_many_missions_is_the_fast_one():
