@@ -1,12 +1,14 @@
 """The names under which Gymnasium and PettingZoo find the environments."""
 
 import re
+from functools import cache
+from pathlib import Path
 
 import gymnasium
 import pettingzoo
 
-VERSIONS = (0,)
-"""Of the environments that there are, oldest first, each in a module `uas_coverage_vN`."""
+_MODULE = re.compile(r"uas_coverage_(v(\d+))")
+"""Of a version of the environments; its version is `VERSION` there."""
 
 LEVEL_NAMES = ("easy", "medium", "hard", "extreme")
 """Those of `tasks.LEVELS`, which is not imported here: a test compares them."""
@@ -23,11 +25,11 @@ def register_environments() -> None:
     PettingZoo has a registry from 1.27 on; before that, modules such as `uas_coverage_v0` are the
     only way to its environments.
     """
-    for number in VERSIONS:
-        module = f"uas_coverage_env.uas_coverage_v{number}"
-        _register_gymnasium(f"UASCoverage-v{number}", module)
-        _register_pettingzoo("parallel", f"uas/coverage-v{number}", f"{module}:parallel_env")
-        _register_pettingzoo("aec", f"uas/coverage-v{number}", f"{module}:env")
+    for version in version_names():
+        module = f"uas_coverage_env.uas_coverage_{version}"
+        _register_gymnasium(f"UASCoverage-{version}", module)
+        _register_pettingzoo("parallel", f"uas/coverage-{version}", f"{module}:parallel_env")
+        _register_pettingzoo("aec", f"uas/coverage-{version}", f"{module}:env")
     for level in LEVEL_NAMES:
         _register_gymnasium(f"UASCoverage/{level.capitalize()}-v0", _TASKS, level=level)
         name, found = f"uas/coverage-{level}-v0", f"{_TASKS}:parallel_env"
@@ -50,12 +52,19 @@ def _register_pettingzoo(kind: str, name: str, entry_point: str, **kwargs: str) 
         pettingzoo.register(kind, name, entry_point, kwargs=kwargs)
 
 
+@cache
+def version_names() -> tuple[str, ...]:
+    """The versions of the environments that there are, oldest first: those with a module."""
+    found = [_MODULE.fullmatch(path.stem) for path in Path(__file__).parent.glob("*.py")]
+    return tuple(each[1] for each in sorted(filter(None, found), key=lambda each: int(each[2])))
+
+
 def successor_of(name: str) -> str | None:
     """The module of environments that has followed one which is gone; None: it is none of those.
 
     Gymnasium says the same of ids.
     """
-    number = re.fullmatch(r"uas_coverage_v(\d+)", name)
-    if number is None or int(number[1]) >= min(VERSIONS):
+    asked, oldest = _MODULE.fullmatch(name), version_names()[0]
+    if asked is None or int(asked[2]) >= int(oldest[1:]):
         return None
-    return f"uas_coverage_v{min(VERSIONS)}"
+    return f"uas_coverage_{oldest}"

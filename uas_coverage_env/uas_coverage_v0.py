@@ -7,7 +7,9 @@ from uas_coverage_env.env.api.aec import env, raw_env
 from uas_coverage_env.env.api.parallel import CoverageParallelEnv
 from uas_coverage_env.env.api.single import CoverageSwarmEnv
 from uas_coverage_env.env.api.vector import vector_env
+from uas_coverage_env.env.versions import V0
 
+VERSION = V0
 parallel_env = CoverageParallelEnv
 swarm_env = CoverageSwarmEnv
 
