@@ -150,10 +150,10 @@ def environments() -> str:
             "one for the swarm",
             CoverageSwarmEnv,
         ),
-        f'gymnasium.make_vec("UASCoverage-v0", num_envs=64, scenario="{SCENARIO}")': (
+        f'uas_coverage_v0.vector_env(64, "{SCENARIO}")': (
             "Gymnasium, vectorised",
             "one for the swarm, 64 missions",
-            partial(CoverageVectorEnv, 64),
+            partial(uas_coverage_v0.vector_env, 64),
         ),
     }
     rows = []

@@ -1,19 +1,18 @@
 """The names under which Gymnasium and PettingZoo find the environments."""
 
 import re
+from functools import cache
+from pathlib import Path
 
 import gymnasium
 import pettingzoo
 
-GYMNASIUM_ID = "UASCoverage-v0"
-PETTINGZOO_ID = "uas/coverage-v0"
+_MODULE = re.compile(r"uas_coverage_(v(\d+))")
+"""Of a version of the environments; its version is `VERSION` there."""
+
 LEVEL_NAMES = ("easy", "medium", "hard", "extreme")
 """Those of `tasks.LEVELS`, which is not imported here: a test compares them."""
 
-VERSIONS = (0,)
-"""Of the environments that there are, each in a module `uas_coverage_vN`."""
-
-_DOOR = "uas_coverage_env.uas_coverage_v0"
 _TASKS = "uas_coverage_env.tasks"
 
 
@@ -23,41 +22,49 @@ def register_environments() -> None:
     `gymnasium.make("UASCoverage-v0")`, `pettingzoo.make("parallel", "uas/coverage-v0")` and
     `pettingzoo.make("aec", "uas/coverage-v0")` find them then; and the levels as
     `gymnasium.make("UASCoverage/Easy-v0")`, `pettingzoo.make("parallel", "uas/coverage-easy-v0")`.
-    PettingZoo has a registry from 1.27 on; before that, `uas_coverage_v0` is the only door.
+    PettingZoo has a registry from 1.27 on; before that, modules such as `uas_coverage_v0` are the
+    only way to its environments.
     """
-    if GYMNASIUM_ID not in gymnasium.registry:
-        gymnasium.register(
-            GYMNASIUM_ID,
-            entry_point="uas_coverage_env.env:CoverageSwarmEnv",
-            vector_entry_point="uas_coverage_env.env:CoverageVectorEnv",
-        )
+    for version in version_names():
+        module = f"uas_coverage_env.uas_coverage_{version}"
+        _register_gymnasium(f"UASCoverage-{version}", module)
+        _register_pettingzoo("parallel", f"uas/coverage-{version}", f"{module}:parallel_env")
+        _register_pettingzoo("aec", f"uas/coverage-{version}", f"{module}:env")
     for level in LEVEL_NAMES:
-        name = f"UASCoverage/{level.capitalize()}-v0"
-        if name not in gymnasium.registry:
-            gymnasium.register(
-                name,
-                entry_point=f"{_TASKS}:swarm_env",
-                vector_entry_point=f"{_TASKS}:vector_env",
-                kwargs={"level": level},
-            )
-    if hasattr(pettingzoo, "register"):
-        if PETTINGZOO_ID not in pettingzoo.parallel_registry:
-            pettingzoo.register("parallel", PETTINGZOO_ID, f"{_DOOR}:parallel_env")
-        if PETTINGZOO_ID not in pettingzoo.aec_registry:
-            pettingzoo.register("aec", PETTINGZOO_ID, f"{_DOOR}:env")
-        for level in LEVEL_NAMES:
-            name = f"uas/coverage-{level}-v0"
-            if name not in pettingzoo.parallel_registry:
-                kwargs = {"level": level}
-                pettingzoo.register("parallel", name, f"{_TASKS}:parallel_env", kwargs=kwargs)
+        _register_gymnasium(f"UASCoverage/{level.capitalize()}-v0", _TASKS, level=level)
+        name, found = f"uas/coverage-{level}-v0", f"{_TASKS}:parallel_env"
+        _register_pettingzoo("parallel", name, found, level=level)
+
+
+def _register_gymnasium(name: str, module: str, **kwargs: str) -> None:
+    if name not in gymnasium.registry:
+        gymnasium.register(
+            name,
+            entry_point=f"{module}:swarm_env",
+            vector_entry_point=f"{module}:vector_env",
+            kwargs=kwargs,
+        )
+
+
+def _register_pettingzoo(kind: str, name: str, entry_point: str, **kwargs: str) -> None:
+    registry = getattr(pettingzoo, f"{kind}_registry", None)
+    if registry is not None and name not in registry:
+        pettingzoo.register(kind, name, entry_point, kwargs=kwargs)
+
+
+@cache
+def version_names() -> tuple[str, ...]:
+    """The versions of the environments that there are, oldest first: those with a module."""
+    found = [_MODULE.fullmatch(path.stem) for path in Path(__file__).parent.glob("*.py")]
+    return tuple(each[1] for each in sorted(filter(None, found), key=lambda each: int(each[2])))
 
 
 def successor_of(name: str) -> str | None:
     """The module of environments that has followed one which is gone; None: it is none of those.
 
-    Gymnasium and PettingZoo say the same of the ids in their registries.
+    Gymnasium says the same of ids.
     """
-    number = re.fullmatch(r"uas_coverage_v(\d+)", name)
-    if number is None or int(number[1]) >= min(VERSIONS):
+    asked, oldest = _MODULE.fullmatch(name), version_names()[0]
+    if asked is None or int(asked[2]) >= int(oldest[1:]):
         return None
-    return f"uas_coverage_v{min(VERSIONS)}"
+    return f"uas_coverage_{oldest}"

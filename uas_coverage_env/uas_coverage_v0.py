@@ -5,8 +5,12 @@ Version history: v0, first version.
 
 from uas_coverage_env.env.api.aec import env, raw_env
 from uas_coverage_env.env.api.parallel import CoverageParallelEnv
+from uas_coverage_env.env.api.single import CoverageSwarmEnv
 from uas_coverage_env.env.api.vector import vector_env
+from uas_coverage_env.env.versions import V0
 
+VERSION = V0
 parallel_env = CoverageParallelEnv
+swarm_env = CoverageSwarmEnv
 
-__all__ = ["env", "parallel_env", "raw_env", "vector_env"]
+__all__ = ["env", "parallel_env", "raw_env", "swarm_env", "vector_env"]

@@ -83,15 +83,6 @@ def test_the_words_about_an_observation_may_change_and_its_numbers_may_not():
     assert not view.model_copy(update={"scales": scales}).has_the_numbers_of(view)
 
 
-def test_an_observation_is_the_same_by_the_names_of_before():
-    view = describe().observation
-    text = view.model_dump_json()
-    for name, former in (("density", "crowd"), ("density_m", "crowd_m"), ("nearest_uas", "rival")):
-        assert f'"{name}"' in text
-        text = text.replace(f'"{name}"', f'"{former}"')
-    assert type(view).model_validate_json(text) == view
-
-
 def test_planners_of_a_kind_are_named_with_their_argument(directory):
     assert "policy" not in registry.planner_names()
     described = {planner.name: planner for planner in describe_planners()}

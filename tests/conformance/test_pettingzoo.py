@@ -10,7 +10,6 @@ import pytest
 from uas_coverage_env import uas_coverage_v0
 from uas_coverage_env.env import CoverageParallelEnv
 from uas_coverage_env.env.actions.kinds import ACTION_NAMES
-from uas_coverage_env.registration import PETTINGZOO_ID
 from uas_coverage_env.scenario import generate_scenario
 
 with warnings.catch_warnings():
@@ -107,10 +106,10 @@ def test_long_random_play_in_turns():
 
 def test_the_registry_makes_both_kinds():
     # the registry came with pettingzoo 1.27
-    parallel = pettingzoo.make("parallel", PETTINGZOO_ID, scenario="open_field", max_cycles=9)
+    parallel = pettingzoo.make("parallel", "uas/coverage-v0", scenario="open_field", max_cycles=9)
     assert isinstance(parallel, CoverageParallelEnv)
     assert (parallel.scenario.name, parallel.max_cycles) == ("open_field", 9)
-    in_turns = pettingzoo.make("aec", PETTINGZOO_ID, action="waypoint")
+    in_turns = pettingzoo.make("aec", "uas/coverage-v0", action="waypoint")
     assert isinstance(in_turns, pettingzoo.AECEnv)
     assert isinstance(in_turns.unwrapped, CoverageParallelEnv)
 
@@ -126,7 +125,7 @@ def test_metadata_says_what_learners_look_for():
     assert all(re.fullmatch("[a-z]+_[0-9]+", agent) for agent in env.possible_agents)
 
 
-def test_the_door_has_four_names():
-    assert uas_coverage_v0.__all__ == ["env", "parallel_env", "raw_env", "vector_env"]
+def test_the_door_has_five_names():
+    assert uas_coverage_v0.__all__ == ["env", "parallel_env", "raw_env", "swarm_env", "vector_env"]
     raw = uas_coverage_v0.raw_env("open_field")
     assert isinstance(raw, pettingzoo.AECEnv)

@@ -192,9 +192,7 @@ def test_what_a_lost_uas_saw_last_stays_also_after_going_on_from_a_state():
     last, mission = batch.observation.copy(), batch.lanes.mission.copy()
     other = CoverageBatch(8, MIXED)
     other.reset(seed=4)
-    state = batch.state_dict()
-    state["company"] = state.pop("around")  # as version 0.2 called it
-    other.load_state_dict(state)
+    other.load_state_dict(batch.state_dict())
     for step in range(3):
         actions = random_actions(batch, 100 + step)
         np.testing.assert_array_equal(other.step(actions), batch.step(actions))

@@ -78,12 +78,6 @@ def test_the_yaw_of_a_uas_that_looks_where_it_flies_is_shown_whole():
     assert other == 0.0
 
 
-@pytest.mark.parametrize(("former", "name"), [("crowd", "density"), ("rival", "nearest_uas")])
-def test_a_feature_is_found_under_its_former_name(former, name):
-    found, wanted = (observation_columns("waypoints", each) for each in (former, name))
-    np.testing.assert_array_equal(found, wanted)
-
-
 def test_an_unknown_feature_is_refused_with_those_known():
     with pytest.raises(ValueError, match=r"own\.position"):
         observation_columns("own", "pozition")

@@ -1,11 +1,13 @@
 """A version of the environments is a set of tuples: they act everywhere, and beside the others."""
 
+import importlib
 import inspect
 import json
 import os
 import pickle
 import subprocess
 import sys
+from dataclasses import fields
 
 import gymnasium
 import numpy as np
@@ -29,7 +31,7 @@ from uas_coverage_env.env import (
     MissionSettings,
     RewardTerm,
 )
-from uas_coverage_env.env.episode.settings import MissionKeywords
+from uas_coverage_env.env.episode.settings import MissionKeywords, inside_name
 from uas_coverage_env.env.report import INFOS
 from uas_coverage_env.env.versions import V0, Version
 
@@ -185,6 +187,11 @@ def test_every_setting_is_in_signature_and_docstring(door):
     assert all(each.kind != each.VAR_KEYWORD for each in parameters.values())
 
 
+def test_every_setting_is_a_keyword_argument():
+    keywords = {inside_name(name) for name in MissionKeywords.__annotations__}
+    assert keywords | {"version"} == {field.name for field in fields(MissionSettings)}
+
+
 def test_the_short_way_to_many_missions_is_the_fast_one():
     short = uas_coverage_v0.vector_env(3, practice_ground(), action="waypoint")
     long = gymnasium.make_vec("UASCoverage-v0", 3, scenario=practice_ground(), action="waypoint")
@@ -193,7 +200,7 @@ def test_the_short_way_to_many_missions_is_the_fast_one():
 
 
 def test_a_version_that_is_gone_names_the_one_that_follows(monkeypatch):
-    monkeypatch.setattr(registration, "VERSIONS", (2, 3))
+    monkeypatch.setattr(registration, "version_names", lambda: ("v2", "v3"))
     with pytest.raises(ImportError, match="uas_coverage_v1 is gone; take uas_coverage_v2"):
         exec("from uas_coverage_env import uas_coverage_v1")
     with pytest.raises(AttributeError, match="uas_coverage_v4"):
@@ -217,3 +224,12 @@ def test_missions_that_have_ended_wait_where_they_rest():
     assert batch.lanes.truncated.all()
     batch.reset(mask=np.array([True, False]))
     assert batch.lanes.truncated.tolist() == [False, True]
+
+
+def test_every_version_has_a_module_and_ids():
+    assert registration.version_names()[0] == "v0"
+    for name in registration.version_names():
+        module = importlib.import_module(f"uas_coverage_env.uas_coverage_{name}")
+        assert module.parallel_env.version is module.swarm_env.version is module.VERSION
+        assert module.VERSION.name == name
+        assert f"UASCoverage-{name}" in gymnasium.registry

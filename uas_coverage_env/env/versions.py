@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from types import MappingProxyType
 from typing import Any
 
@@ -10,6 +11,7 @@ from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
 from uas_coverage_env.env.observation.named import OBSERVATIONS
 from uas_coverage_env.env.report import INFOS, InfoField
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
+from uas_coverage_env.registration import version_names
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Version:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # kernels know a version by its identity
-        if VERSIONS.get(self.name) is self:
+        if self.name in version_names() and version_named(self.name) is self:
             return version_named, (self.name,)
         return super().__reduce__()  # pyrefly: ignore[bad-return]
 
@@ -87,10 +89,8 @@ class Version:
 V0 = Version("v0", OBSERVATION, REWARD, ACTIONS, observations=OBSERVATIONS)
 """The first version."""
 
-VERSIONS: dict[str, Version] = {V0.name: V0}
-"""Those that there are, oldest first."""
-
 
 def version_named(name: str) -> Version:
-    """The version of this name."""
-    return VERSIONS[name]
+    """The version of the module `uas_coverage_NAME`."""
+    version: Version = import_module(f"uas_coverage_env.uas_coverage_{name}").VERSION
+    return version

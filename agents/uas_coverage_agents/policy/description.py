@@ -3,11 +3,10 @@
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, JsonValue, field_validator, model_validator
+from pydantic import Field, JsonValue, model_validator
 
 from uas_coverage_agents.policy.networks import Network
 from uas_coverage_env.env.observation.block import Group
-from uas_coverage_env.env.observation.scales import FORMER_NAMES
 from uas_coverage_env.files.strict_toml import StrictModel
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -23,11 +22,6 @@ class ObservedFeature(StrictModel):
     low: float
     high: float
     meaning: str
-
-    @field_validator("name")
-    @classmethod
-    def _present_name(cls, name: str) -> str:
-        return FORMER_NAMES.get(name, name)
 
 
 class ObservedGroup(StrictModel):
@@ -55,11 +49,6 @@ class Observation(StrictModel):
     layout: Name
     groups: Annotated[tuple[ObservedGroup, ...], Field(min_length=1)]
     scales: dict[Name, float]
-
-    @field_validator("scales")
-    @classmethod
-    def _present_names(cls, scales: dict[str, float]) -> dict[str, float]:
-        return {FORMER_NAMES.get(name, name): scale for name, scale in scales.items()}
 
     @property
     def size(self) -> int:

@@ -35,7 +35,6 @@ from uas_coverage_env.env.batch.memory import (
 )
 from uas_coverage_env.env.batch.scenes import change_scenes, install_scenes
 from uas_coverage_env.env.batch.state_dict import (
-    by_present_names,
     check_like,
     fields_of,
     records_of,
@@ -320,7 +319,7 @@ class CoverageBatch:
             ValueError: An array is missing, surplus, of another shape or dtype, or holds what no
                 mission of this batch can have.
         """
-        own, state = self._changing(), by_present_names(state)
+        own = self._changing()
         check_like(state, fields_of(own))
         state = records_of(state, own)
         drawn, changed = checked(self.pool, state)

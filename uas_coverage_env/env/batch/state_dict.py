@@ -10,14 +10,6 @@ Limits = Mapping[str, tuple[ArrayLike, ArrayLike]]
 """Name of an array -> lowest and highest value of its elements, arrays that broadcast to it."""
 
 
-_FORMER = {"company": "around"}
-
-
-def by_present_names(state: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """The arrays by the names of this version; version 0.2 had another for one of them."""
-    return {_FORMER.get(name, name): array for name, array in state.items()}
-
-
 def check_like(state: Mapping[str, NDArray[Any]], own: Mapping[str, NDArray[Any]]) -> None:
     """Refuse arrays that are not as our own are.
 

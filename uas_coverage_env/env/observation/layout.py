@@ -11,7 +11,6 @@ from uas_coverage_env.env.observation.moving_obstacles import MOVING_OBSTACLES
 from uas_coverage_env.env.observation.others import OTHERS
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.env.observation.remaining import REMAINING
-from uas_coverage_env.env.observation.scales import FORMER_NAMES
 from uas_coverage_env.env.observation.surroundings import SURROUNDINGS
 from uas_coverage_env.env.observation.waypoints import WAYPOINTS
 
@@ -51,7 +50,7 @@ def observation_columns(
 
     Args:
         group_name: Name of a block.
-        feature_name: As in that block, or as it was called before.
+        feature_name: As in that block.
         blocks: What the observation is made of.
 
     Returns:
@@ -60,12 +59,11 @@ def observation_columns(
     Raises:
         ValueError: There is no such feature.
     """
-    names = (feature_name, FORMER_NAMES.get(feature_name))
     start = 0
     for group in blocks:
         width = group.width
         for feature in group.features:
-            if group.name == group_name and feature.name in names:
+            if group.name == group_name and feature.name == feature_name:
                 rows = start + width * np.arange(group.repeats)
                 return rows[:, None] + np.arange(feature.size)
             start += feature.size

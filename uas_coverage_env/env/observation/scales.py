@@ -52,9 +52,6 @@ SCALES = {
 }
 """All of the scales above by name: a policy that was trained with others sees another world."""
 
-FORMER_NAMES = {"crowd": "density", "crowd_m": "density_m", "rival": "nearest_uas"}
-"""What scales and features of waypoints are called now that had other names in version 0.2."""
-
 SCALES_DTYPE = record_dtype(
     [
         # one over the limits of the vehicle
