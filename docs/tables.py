@@ -336,24 +336,17 @@ def _without_meanings(rows: str) -> str:
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
-OPERATIONS = {
-    "area_import": ("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
-    "mission_export": ("exported_files", "autopilot_parameters", "autopilot_failures"),
-    "stream": ("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
-    "logs": ("log_formats", "log_rules"),
-}
-"""Tables of the rooms of `uas_coverage_env.operations`, by room."""
+OPERATIONS = (
+    *("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
+    *("exported_files", "autopilot_parameters", "autopilot_failures", "log_formats", "log_rules"),
+    *("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
+)
+"""Functions of operations_tables.py, which needs the extra `ops`."""
 
 
-def of_operations(room: str, name: str) -> Callable[[], str]:
-    """A table that `uas_coverage_env.operations` makes, which needs the extra `ops`."""
-
-    def made() -> str:
-        found = importlib.import_module(f"uas_coverage_env.operations.{room}.tables")
-        head, rows = getattr(found, name)()
-        return table(head, rows)
-
-    return made
+def of_operations(name: str) -> str:
+    """One of these tables."""
+    return table(*getattr(importlib.import_module("operations_tables"), name)())
 
 
 PARTS: dict[str, Callable[[], str]] = {
@@ -376,7 +369,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "families": families_table,
     "planners": planners,
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
-    **{name: of_operations(room, name) for room, names in OPERATIONS.items() for name in names},
+    **{name: partial(of_operations, name) for name in OPERATIONS},
 }
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from uas_coverage_env.operations.mission_export.formats.ardupilot import waypoints_text
+from uas_coverage_env.operations.mission_export.formats.firmware import PX4
 from uas_coverage_env.operations.mission_export.formats.geofence import fence_text
 from uas_coverage_env.operations.mission_export.formats.parameters import (
-    PX4,
     Facts,
     param_text,
     params_text,
