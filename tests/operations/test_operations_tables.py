@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
 import operations_tables as tables
 from tables import OPERATIONS
 
+from uas_coverage_env.operations.area_import.readers.qgc_plan import ITEMS
 from uas_coverage_env.operations.stream import giving_up
 
 
@@ -23,3 +24,8 @@ def test_every_row_of_a_table_has_a_cell_for_each_heading(name):
 def test_all_that_a_stream_that_is_given_up_may_end_in_is_listed():
     _, rows = tables.stream_reactions()
     assert [row[0] for row in rows] == [f"`{name}`" for name in giving_up.REACTIONS]
+
+
+def test_all_items_of_a_plan_that_are_read_are_listed():
+    _, rows = tables.plan_items()
+    assert [row[0] for row in rows] == [f"`{kind}`" for kind in ITEMS]
