@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from uas_coverage_env.draw import colours
+from uas_coverage_env.draw.marks import heavy_waypoints
 from uas_coverage_env.flight import SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.geometry.outline import outline_of
@@ -74,17 +75,20 @@ def _obstacles(history: SceneHistory) -> list[dict[str, Any]]:
 
 def _waypoints(history: SceneHistory) -> list[dict[str, Any]]:
     waypoints, never = history.scenario.waypoints, len(history.moving_position_m)
-    lightest = min(waypoint.weight for waypoint in waypoints)
     return [
         {
             "at": _metres(np.array(waypoint.position_m)),
             "radius": waypoint.radius_m,
-            "heavy": waypoint.weight > lightest,
+            "heavy": heavy,
             "from": int(since),
             "until": int(until) if until < never else None,
         }
-        for waypoint, since, until in zip(
-            waypoints, history.waypoint_from, history.waypoint_until, strict=True
+        for waypoint, heavy, since, until in zip(
+            waypoints,
+            heavy_waypoints(history.scenario),
+            history.waypoint_from,
+            history.waypoint_until,
+            strict=True,
         )
     ]
 
