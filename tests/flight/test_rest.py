@@ -144,7 +144,7 @@ def test_mistakes_are_refused_in_one_line(mission, broken_off, tmp_path, capsys)
     new = str(tmp_path / "rest.toml")
     for directory, out, said in (
         ("flight", str(tmp_path / "rest.json"), "should end in .toml"),
-        ("flight", str(tmp_path / "there.toml"), "exists; give another --out"),
+        ("flight", str(tmp_path / "there.toml"), "exists; give another file"),
         ("nowhere", new, "nowhere"),
         ("done", new, "has covered everything"),
     ):
