@@ -360,24 +360,17 @@ def comparison_columns() -> str:
 FIGURES = {each.name: each for each in figures.FIGURES}
 """Those of this package, whatever others are installed."""
 
-OPERATIONS = {
-    "area_import": ("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
-    "mission_export": ("exported_files", "autopilot_parameters", "autopilot_failures"),
-    "stream": ("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
-    "logs": ("log_formats", "log_rules"),
-}
-"""Tables of the rooms of `uas_coverage_env.operations`, by room."""
+OPERATIONS = (
+    *("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
+    *("exported_files", "autopilot_parameters", "autopilot_failures", "log_formats", "log_rules"),
+    *("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
+)
+"""Functions of operations_tables.py, which needs the extra `ops`."""
 
 
-def of_operations(room: str, name: str) -> Callable[[], str]:
-    """A table that `uas_coverage_env.operations` makes, which needs the extra `ops`."""
-
-    def made() -> str:
-        found = importlib.import_module(f"uas_coverage_env.operations.{room}.tables")
-        head, rows = getattr(found, name)()
-        return table(head, rows)
-
-    return made
+def of_operations(name: str) -> str:
+    """One of these tables."""
+    return table(*getattr(importlib.import_module("operations_tables"), name)())
 
 
 def batch_arrays() -> str:
@@ -419,7 +412,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "figures": flight_figures,
     "comparison_columns": comparison_columns,
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
-    **{name: of_operations(room, name) for room, names in OPERATIONS.items() for name in names},
+    **{name: partial(of_operations, name) for name in OPERATIONS},
 }
 
 

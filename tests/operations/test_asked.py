@@ -14,7 +14,8 @@ from qgc_loader import problems
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.operations import ExportOptions, make_export
 from uas_coverage_env.operations.geodesy import LocalFrame
-from uas_coverage_env.operations.mission_export.tracks import Tolerances, make_tracks
+from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
+from uas_coverage_env.operations.mission_export.tracks import Tolerances
 from uas_coverage_env.operations.mission_export.waypoint_requirements import not_as_asked
 from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, follow
 from uas_coverage_env.scenario import Execution, Place, load_scenario

@@ -25,7 +25,8 @@ from uas_coverage_env.features.wind import Wind
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import ExportOptions, make_export
 from uas_coverage_env.operations.mission_export.formats import ENDINGS, FORMATS
-from uas_coverage_env.operations.mission_export.tracks import Tolerances, make_tracks
+from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
+from uas_coverage_env.operations.mission_export.tracks import Tolerances
 from uas_coverage_env.operations.path_geometry import cut_path, distances_m
 from uas_coverage_env.scenario import Place, load_scenario
 

@@ -8,8 +8,9 @@ pytest.importorskip("pyproj")
 from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env import rollout
+from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
 from uas_coverage_env.operations.mission_export.return_paths import RETRACE, RETURN, return_path
-from uas_coverage_env.operations.mission_export.tracks import Tolerances, make_tracks
+from uas_coverage_env.operations.mission_export.tracks import Tolerances
 from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, Followed
 
 START_M = (20.0, 100.0, -1.0)

@@ -76,8 +76,7 @@ class Picture:
         self._frame = frame = Frame.around(scenario.fence.vertices_m, int(size_px))
         positions_m = np.array([point.position_m for point in scenario.waypoints]).reshape(-1, 3)
         self._waypoints = frame.pixels(positions_m).tolist()
-        weights = [point.weight for point in scenario.waypoints]
-        self._heavy = [weight > min(weights) for weight in weights]
+        self._heavy = marks.heavy_waypoints(scenario)
         self._radii = [point.radius_m * frame.scale for point in scenario.waypoints]
         self._labels = [short_name(uas.name) for uas in scenario.uas]
         self._canvas = Canvas(frame.side)

@@ -69,7 +69,7 @@ def height_places(scenario: Scenario, frame: Frame) -> list[tuple[float, float] 
     return [
         free_place(
             frame.pixels(outline_of(hull.vertices_m)),
-            np.array([width_of(_height(hull), size), size]) + frame.unit,
+            np.array([width_of(height_words(hull), size), size]) + frame.unit,
             discs,
         )
         for hull in scenario.hulls
@@ -151,10 +151,11 @@ def _obstacle(
     draw.line(edge, fill=colours.shaded(tint, 0.55), width=width, joint="curve")
     ink = colours.WHITE if sum(tint) < _DARK else colours.shaded(tint, 0.35)
     if place is not None:
-        write(image, place, _height(hull), _HEIGHT * frame.letter, ink, align=0.5)
+        write(image, place, height_words(hull), _HEIGHT * frame.letter, ink, align=0.5)
 
 
-def _height(hull: ConvexPolytope) -> str:
+def height_words(hull: ConvexPolytope) -> str:
+    """How high an obstacle is, as it stands on maps."""
     return f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
 
 

@@ -23,7 +23,6 @@ LARGE_GAP = 0.05
 """A decision that was solved to a larger gap than this is marked."""
 
 _TOLERANCE_M = 1e-6
-_Reason = tuple[str, str]  # what is said, and of whom
 
 
 def marks(

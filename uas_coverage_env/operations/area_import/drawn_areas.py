@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.operations.area_import.area_options import (
     NAMES,
     NO_OPTIONS,
@@ -24,7 +22,6 @@ from uas_coverage_env.operations.area_import.geo_features import GeoFeature, Par
 from uas_coverage_env.operations.area_import.length_texts import length_m, length_with_unit_m
 from uas_coverage_env.operations.area_import.osm_tags import LEAST_M, OTHER, half_width_m, height_m
 
-MOST_BYTES = 20_000_000
 MOST_CORNERS = 100_000
 _HEAVIEST = 1e6
 _WIDEST_M = 20_000.0
@@ -142,21 +139,6 @@ def drawn_of(feature: GeoFeature, *, on_map: bool = False) -> Iterator[Drawn]:
         if meaning.against:
             yield Remark(f"{feature.source}: {meaning.said_by} counts, against {meaning.against}")
         yield from _MAKE[meaning.becomes](feature, part, meaning)
-
-
-def content(path: Path) -> bytes:
-    """What a file holds, if it is a plain one and not larger than anything drawn.
-
-    Raises:
-        InputError: It is not, or cannot be read.
-    """
-    try:
-        return read_bytes(path, MOST_BYTES)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; check the path") from None
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError(f"{path}: cannot be read ({reason}); check the path") from None
 
 
 def limited(source: str, things: Iterable[Drawn]) -> Iterator[Drawn]:

@@ -30,12 +30,7 @@ _STANDING = {
     MAST: "masts and towers",
     STRUCTURE: "structures",
 }
-_DRAWN = {
-    "search": "area",
-    "no_fly": "no-fly zone",
-    "fence": "fence",
-    "obstacle": "obstacle",
-}
+_DRAWN = {"search": "area", "no_fly": "no-fly zone", "fence": "fence", "obstacle": "obstacle"}
 _MOST_NAMES = 3
 _SHORTEST = 3  # letters that names share, to be said once for all
 

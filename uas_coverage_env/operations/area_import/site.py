@@ -23,11 +23,7 @@ from uas_coverage_env.operations.area_import.local_polygons import (
 )
 from uas_coverage_env.operations.area_import.osm_tags import BUILDING, FOREST, STRUCTURE
 from uas_coverage_env.operations.area_import.prisms import Standing, prisms
-from uas_coverage_env.operations.convex import (
-    convex_pieces,
-    hull_of,
-    without_holes,
-)
+from uas_coverage_env.operations.convex import convex_pieces, hull_of, without_holes
 from uas_coverage_env.operations.geodesy import LocalFrame
 
 SAFE_DISTANCE_M = 3.0
@@ -197,9 +193,7 @@ def town_walls(standing: Sequence[Standing], fence: Polygon) -> list[Wall]:
     ]
 
 
-def _drawn_fence(
-    drawn: Sequence[tuple[DrawnPolygon, Polygon]],
-) -> tuple[BaseGeometry, list[str]]:
+def _drawn_fence(drawn: Sequence[tuple[DrawnPolygon, Polygon]]) -> tuple[BaseGeometry, list[str]]:
     """Where UAS stay by all fences that were drawn, and how several are taken."""
     groups: dict[str, list[Polygon]] = {}
     for thing, shape in drawn:
@@ -281,9 +275,7 @@ def _apart(areas: list[Area]) -> tuple[Area, ...]:
 
 
 def _fence(
-    drawn: BaseGeometry,
-    areas: tuple[Area, ...],
-    homes_m: tuple[tuple[float, float], ...],
+    drawn: BaseGeometry, areas: tuple[Area, ...], homes_m: tuple[tuple[float, float], ...]
 ) -> Polygon:
     if drawn.is_empty:
         around = shapely.union_all([*(area.shape for area in areas), *map(Point, homes_m)])

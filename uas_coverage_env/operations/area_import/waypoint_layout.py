@@ -36,10 +36,7 @@ class Layout:
 
 
 def lay_waypoints(
-    area: BaseGeometry,
-    pitch_m: tuple[float, float],
-    allowed: BaseGeometry,
-    label: str,
+    area: BaseGeometry, pitch_m: tuple[float, float], allowed: BaseGeometry, label: str
 ) -> Layout:
     """Places from which all of an area is seen.
 

@@ -133,7 +133,7 @@ def path_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame)
     left_s, ends_s, home, said = _ends(scenario, flight, start_m, log.time_s, places_m)
     return FlownPath(
         flight, log, places_m, left_s, ends_s, home,
-        tuple(unknown), doubtful, tuple(estimates), (*notes, *said),
+        tuple(unknown), doubtful, tuple(estimates), (*notes, *said)
     )  # fmt: skip
 
 

@@ -140,7 +140,7 @@ class FlownWorld(World):
             outcome = np.zeros(len(self.names), dtype=OUTCOME_DTYPE)
             judge_moment(
                 at, self._commands, moments.x[m], resting if last else no_one,
-                moments.known[m], moments.measured[m], last, outcome,
+                moments.known[m], moments.measured[m], last, outcome
             )  # fmt: skip
             passes += [(m, int(i)) for i in np.flatnonzero(outcome["newly_covered"])]
             whole = outcome if m == 0 else _both(whole, outcome)

@@ -9,7 +9,7 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.operations.logs import csv_table, dataflash, telemetry, ulog
 from uas_coverage_env.operations.logs.logged import Logged, limited
-from uas_coverage_env.operations.logs.messages import Message
+from uas_coverage_env.operations.logs.messages import Messages
 
 _MOST_BYTES = 500_000_000
 
@@ -29,7 +29,7 @@ class Format(NamedTuple):
     messages: Mapping[str, str]
 
 
-def _meanings(messages: Mapping[str, Message]) -> dict[str, str]:
+def _meanings(messages: Messages) -> dict[str, str]:
     return {name: message.meaning for name, message in messages.items()}
 
 

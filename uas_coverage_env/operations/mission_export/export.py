@@ -18,7 +18,8 @@ from uas_coverage_env.operations.flight_checks import check_flight, place_of_fli
 from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.mission_export.failure_responses import not_safe
 from uas_coverage_env.operations.mission_export.formats import AUTOPILOTS, FORMATS
-from uas_coverage_env.operations.mission_export.formats.parameters import FIRMWARES, PX4
+from uas_coverage_env.operations.mission_export.formats.firmware import FIRMWARES, PX4
+from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
 from uas_coverage_env.operations.mission_export.mission_file import (
     ExportSettings,
     MissionFile,
@@ -32,7 +33,7 @@ from uas_coverage_env.operations.mission_export.scheduling import (
     FlightStart,
     scheduled,
 )
-from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track, make_tracks
+from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track
 from uas_coverage_env.operations.mission_export.waypoint_requirements import stopping
 from uas_coverage_env.planning.execution.leg_model import Followed
 from uas_coverage_env.planning.execution.separation import Waits, ready_s

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track, relaid
+from uas_coverage_env.operations.mission_export.lay_tracks import relaid
+from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track
 from uas_coverage_env.operations.path_geometry import distances_m
 from uas_coverage_env.planning.execution.lateness import kept_m
 from uas_coverage_env.planning.execution.separation import Waits

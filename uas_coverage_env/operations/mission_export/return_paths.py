@@ -18,6 +18,7 @@ from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.operations.clearance import Surroundings
 from uas_coverage_env.operations.mission_export.tracks import Track
 from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M
+from uas_coverage_env.planning.execution.lateness import apart_m
 from uas_coverage_env.planning.execution.leg_model import (
     DT_S,
     Autopilot,
@@ -308,10 +309,9 @@ def _near(way: Way, paths: _Paths, others: Sequence[Other], begins_s: float) -> 
         places_m = other.followed.places_m
         clock_s = begins_s + begun_s - other.begins_s
         at = np.clip(np.rint(clock_s / DT_S).astype(np.intp), 0, len(places_m) - 1)
-        away = mine_m - places_m[at]
-        apart_m = np.maximum(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2]))
         flying = (-mine_m[:, 2] > _FLYING_M) | (-places_m[at, 2] > _FLYING_M)
-        close = np.logical_or.reduceat(flying & (apart_m < other.kept_m), starts)
+        too_near = apart_m(mine_m, places_m[at]) < other.kept_m
+        close = np.logical_or.reduceat(flying & too_near, starts)
         found += [span._replace(of=other.name) for span in _spans(paths.times_s, close)]
     return tuple(found)
 

@@ -207,11 +207,7 @@ def _schedule(
     """Tracks with waits."""
     scenario = flight.scenario
     fleet = [
-        (
-            track.uas,
-            partial(followed, track, scenario, settings.tolerances),
-        )
-        for track in tracks
+        (track.uas, partial(followed, track, scenario, settings.tolerances)) for track in tracks
     ]
     pauses_s = [track.sortie.rest_s for track in tracks]
     waits = separate(scenario, fleet, settings.min_slack_s, pauses_s, in_hover=True)

@@ -2,6 +2,6 @@
 
 from uas_coverage_env.operations.stream.clock import Clock, RealClock
 from uas_coverage_env.operations.stream.companion import Ended, StreamOptions
-from uas_coverage_env.operations.stream.stream_flight import stream_flight
+from uas_coverage_env.operations.stream.run_stream import stream_flight
 
 __all__ = ["Clock", "Ended", "RealClock", "StreamOptions", "stream_flight"]

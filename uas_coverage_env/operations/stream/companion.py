@@ -229,8 +229,7 @@ class Companion:
             elif name in self._back:
                 others_m = self._fleet.others_m(name)
                 self._back[name].go_on(
-                    *(link, plan, self.plan_s, self._around, others_m, passed_s),
-                    stands=rate == 0.0,
+                    *(link, plan, self.plan_s, self._around, others_m, passed_s), stands=rate == 0.0
                 )
                 if self._back[name].is_there:
                     del self._back[name]

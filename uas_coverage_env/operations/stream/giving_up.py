@@ -174,10 +174,7 @@ class GivingUp:
             others_m = self._fleet.others_m(link.name)
             clear["land"] = self._around.may_land(link.name, link.place_m, others_m)
             clear["rtl"] = self._around.goes_straight_home(
-                link.name,
-                link.place_m,
-                self._homes_m[link.name],
-                self._limits[link.name].return_m,
+                link.name, link.place_m, self._homes_m[link.name], self._limits[link.name].return_m
             )
         return [mode for mode in REACTIONS[self._reaction].modes if clear.get(mode)]
 

@@ -193,7 +193,7 @@ class VehicleLink:
         velocity = (float(value) for value in velocity_mps)
         self._link.mav.set_position_target_global_int_send(
             0, self._addressee, 1, _RELATIVE_FRAME, _TYPE_MASK, *whole, height,
-            *velocity, 0.0, 0.0, 0.0, 0.0, 0.0,
+            *velocity, 0.0, 0.0, 0.0, 0.0, 0.0
         )  # fmt: skip
 
     def close(self) -> None:

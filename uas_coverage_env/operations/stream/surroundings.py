@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.operations.clearance import Surroundings
 from uas_coverage_env.operations.stream.vehicle_limits import Limits
-from uas_coverage_env.planning.execution.lateness import kept_m
+from uas_coverage_env.planning.execution.lateness import apart_m, kept_m
 from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]
@@ -92,14 +92,3 @@ def stopping_place_m(place_m: FloatArray, velocity_mps: FloatArray, limits: Limi
     if speed_mps < 1e-6:
         return place_m
     return place_m + velocity_mps * (limits.stops_m(speed_mps) / speed_mps)
-
-
-def apart_m(one_m: FloatArray, other_m: FloatArray) -> FloatArray:
-    """(...) distance of places, level or upright, whichever is larger [m].
-
-    Args:
-        one_m: (..., 3) [m].
-        other_m: (..., 3) [m].
-    """
-    away = one_m - other_m
-    return np.maximum(np.hypot(away[..., 0], away[..., 1]), np.abs(away[..., 2]))

@@ -16,13 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
-from uas_coverage_env.operations.stream.surroundings import (
-    SwarmSurroundings,
-    apart_m,
-    stopping_place_m,
-)
+from uas_coverage_env.operations.stream.surroundings import SwarmSurroundings, stopping_place_m
 from uas_coverage_env.operations.stream.timeline import Timeline
 from uas_coverage_env.operations.stream.vehicle_limits import Limits
+from uas_coverage_env.planning.execution.lateness import apart_m
 
 FloatArray = NDArray[np.float64]
 

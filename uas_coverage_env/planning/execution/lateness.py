@@ -106,6 +106,17 @@ def kept_m(scenario: Scenario, i: int, j: int) -> float:
     return scenario.uas[i].radius_m + scenario.uas[j].radius_m + scenario.uas_safe_distance_m
 
 
+def apart_m(one_m: NDArray[np.float64], other_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(...) distance of places, level or upright, whichever is larger [m].
+
+    Args:
+        one_m: (..., 3) [m].
+        other_m: (..., 3) [m].
+    """
+    away = one_m - other_m
+    return np.maximum(np.hypot(away[..., 0], away[..., 1]), np.abs(away[..., 2]))
+
+
 def encounters(a: Followed, b: Followed, distance_m: float) -> NDArray[np.intp]:
     """(N, 2) samples of the two, one of them flying, that may be closer than must be kept.
 
@@ -122,9 +133,7 @@ def encounters(a: Followed, b: Followed, distance_m: float) -> NDArray[np.intp]:
     for n, others in enumerate(near):
         if others:
             m = np.array(others)
-            away = a.places_m[n] - b.places_m[m]
-            apart_m = np.maximum(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2]))
-            close = apart_m < distance_m + half_a[n] + half_b[m]
+            close = apart_m(a.places_m[n], b.places_m[m]) < distance_m + half_a[n] + half_b[m]
             flying = (-b.places_m[m, 2] > _FLYING_M) | (-a.places_m[n, 2] > _FLYING_M)
             m = m[close & flying]
             found.append(np.column_stack([np.full(len(m), n), m]))
@@ -148,5 +157,4 @@ def _least_m(one: Timed, other: Timed) -> float:
         samples = np.rint((clock_s - timed.begins_s) / DT_S).astype(np.intp)
         last = len(timed.followed.places_m) - 1
         places.append(timed.followed.places_m[np.clip(samples, 0, last)])
-    away = places[0] - places[1]
-    return float(np.maximum(np.hypot(away[:, 0], away[:, 1]), np.abs(away[:, 2])).min())
+    return float(apart_m(*places).min())

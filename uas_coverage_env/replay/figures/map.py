@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.labels import Box, free_place, overlap, short_name
+from uas_coverage_env.draw.marks import heavy_waypoints
+from uas_coverage_env.draw.terrain import height_words
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, seen_ground
 from uas_coverage_env.flight.scene_history import SceneHistory
@@ -146,12 +148,12 @@ def _seen_ground(axes: Axes, seen: Sequence[SeenGround]) -> None:
 
 
 def _waypoints(axes: Axes, scenario: Scenario, covered: NDArray[np.bool_], m_per_pt: float) -> None:
-    lightest = min((waypoint.weight for waypoint in scenario.waypoints), default=1.0)
-    for waypoint, done in zip(scenario.waypoints, covered, strict=True):
+    heavy = heavy_waypoints(scenario)
+    for waypoint, weighs_more, done in zip(scenario.waypoints, heavy, covered, strict=True):
         x, y = waypoint.position_m[1], waypoint.position_m[0]
         edge = shade(colours.COVERED_EDGE if done else colours.INK)
         # a ring in a ring counts more
-        radii = [waypoint.radius_m, *([0.82 * waypoint.radius_m] * (waypoint.weight > lightest))]
+        radii = [waypoint.radius_m, *([0.82 * waypoint.radius_m] * weighs_more)]
         for radius in radii:
             axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=edge, linewidth=0.7))
         if done:
@@ -170,7 +172,7 @@ def _heights(
     ).reshape(-1, 3)
     heights = []
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-        words = f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
+        words = height_words(hull)
         box_m = m_per_pt * _LABEL_PT * np.array([_LETTER * len(words), 1.1])
         place = free_place(_flat(outline_of(hull.vertices_m)), box_m, discs_m)
         if place is not None:

@@ -11,12 +11,12 @@ import pyproj
 from pyproj.exceptions import ProjError
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.drawn_areas import content
 from uas_coverage_env.operations.area_import.geo_features import (
     GEOMETRIES,
     GeoFeature,
     attributes_of,
 )
+from uas_coverage_env.operations.area_import.readers import content
 
 _DEEPEST = 20
 _OWN = {"type", "geometry", "geometries", "coordinates", "properties", "features", "bbox", "crs"}

@@ -18,9 +18,9 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.drawn_areas import MOST_BYTES, content
 from uas_coverage_env.operations.area_import.geo_features import GeoFeature, attributes_of
 from uas_coverage_env.operations.area_import.osm_tags import LEAST_M
+from uas_coverage_env.operations.area_import.readers import MOST_BYTES, content
 
 _GEOMETRIES = ("Polygon", "LinearRing", "LineString", "Point", "Track")
 _NOT_READ = ("NetworkLink", "GroundOverlay", "PhotoOverlay", "ScreenOverlay", "Tour", "Model")

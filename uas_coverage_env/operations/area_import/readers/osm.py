@@ -12,10 +12,10 @@ from osmium.io import FileBuffer
 from osmium.osm import Area, Node, Relation, Way
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.drawn_areas import content
 from uas_coverage_env.operations.area_import.feature_roles import speaks_of_flying
 from uas_coverage_env.operations.area_import.geo_features import GeoFeature, attributes_of
 from uas_coverage_env.operations.area_import.osm_tags import BUILDING, FOREST, KEYS, standing_of
+from uas_coverage_env.operations.area_import.readers import content
 
 _KEYS = frozenset((*KEYS, "highway"))
 LACKS_CORNERS = "outline that lacks corners"

@@ -14,9 +14,10 @@ import shapefile
 from pyproj.exceptions import ProjError
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.area_import.drawn_areas import MOST_CORNERS, content
+from uas_coverage_env.operations.area_import.drawn_areas import MOST_CORNERS
 from uas_coverage_env.operations.area_import.geo_features import GeoFeature, attributes_of
 from uas_coverage_env.operations.area_import.osm_tags import KEYS
+from uas_coverage_env.operations.area_import.readers import content
 
 _LANGUAGES: Mapping[int, str] = {
     **{0x01: "cp437", 0x02: "cp850", 0x03: "cp1252", 0x08: "cp865", 0x0D: "cp437"},

@@ -1,29 +1,25 @@
 """What an export writes for each UAS; a new format is a line in `FORMATS`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 from uas_coverage_env.operations.mission_export.formats.ardupilot import waypoints_text
+from uas_coverage_env.operations.mission_export.formats.firmware import PX4
 from uas_coverage_env.operations.mission_export.formats.geofence import fence_text
 from uas_coverage_env.operations.mission_export.formats.parameters import (
-    PX4,
     Facts,
     param_text,
     params_text,
 )
 from uas_coverage_env.operations.mission_export.formats.qgc import plan_text
 from uas_coverage_env.operations.mission_export.formats.track_files import (
+    UasFiles,
     csv_text,
     geojson_text,
     kml_text,
 )
-from uas_coverage_env.operations.mission_export.mission_file import MissionFile
-from uas_coverage_env.operations.mission_export.scheduling import FlightFiles
 from uas_coverage_env.operations.mission_export.tracks import Tolerances
 
-Flown = Sequence[tuple[FlightFiles, MissionFile]]
-"""The sorties of one UAS in their order, each with the flight that it is part of."""
-
-Writer = Callable[[str, Flown, Tolerances, str | None], Mapping[str, str]]
+Writer = Callable[[str, UasFiles, Tolerances, str | None], Mapping[str, str]]
 """Name of a UAS, its sorties, tolerances, firmware -> name of a file and its text."""
 
 _OneSortie = Callable[[Facts, str | None, int], Mapping[str, str]]
@@ -52,7 +48,7 @@ def _each(write: _OneSortie) -> Writer:
     """Files for each sortie: a mission of an autopilot is one take-off and one landing."""
 
     def written(
-        name: str, flown: Flown, tolerances: Tolerances, firmware: str | None
+        name: str, flown: UasFiles, tolerances: Tolerances, firmware: str | None
     ) -> Mapping[str, str]:
         system_id = 1 + flown[0][0].flight.names.index(name)
         return {

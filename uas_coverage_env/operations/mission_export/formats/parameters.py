@@ -10,21 +10,23 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from uas_coverage_env.operations.mission_export.formats.firmware import (
+    COPTER_46,
+    COPTER_47,
+    FLOAT,
+    INT8,
+    INT16,
+    INT32,
+    Named,
+    copter,
+    copter_cm,
+    px4,
+)
 from uas_coverage_env.operations.mission_export.mission_file import MissionFile
 from uas_coverage_env.operations.mission_export.return_paths import CEILING_MARGIN_M, RETURN
 from uas_coverage_env.operations.mission_export.tracks import Tolerances
 from uas_coverage_env.planning.execution.leg_model import LAND_BELOW_M, LAND_MPS, Autopilot
 from uas_coverage_env.scenario import Scenario
-
-COPTER_46, COPTER_47, PX4 = "copter-4.6", "copter-4.7", "px4"
-FIRMWARES: Mapping[str, str] = {
-    COPTER_46: "ArduCopter up to 4.6",
-    COPTER_47: "ArduCopter from 4.7 on",
-    PX4: "PX4",
-}
-
-_INT8, _INT16, _INT32, _FLOAT = 2, 4, 6, 9
-"""MAV_PARAM_TYPE."""
 
 ALL_FENCES = 7
 """Ceiling, circle around home and polygons: the circle is there where no polygon was loaded."""
@@ -78,22 +80,6 @@ class Facts(NamedTuple):
         return self.ceiling_m - CEILING_MARGIN_M if height_m is None else height_m
 
 
-class Named(NamedTuple):
-    """A parameter as a firmware has it.
-
-    Attributes:
-        name: Its name.
-        kind: MAV_PARAM_TYPE.
-        unit: That it is in, empty: a number.
-        scale: From the value of the table to that unit.
-    """
-
-    name: str
-    kind: int = _FLOAT
-    unit: str = ""
-    scale: float = 1.0
-
-
 class Parameter(NamedTuple):
     """One thing that is set.
 
@@ -108,19 +94,6 @@ class Parameter(NamedTuple):
     names: Mapping[str, Named]
 
 
-def _copter(old: Named, new: Named | None = None) -> dict[str, Named]:
-    """Names up to 4.6 and from 4.7 on; the same where there is one."""
-    return {COPTER_46: old, COPTER_47: new or old}
-
-
-def _cm(old: str, new: str, kind: int = _FLOAT, unit: str = "m") -> dict[str, Named]:
-    return _copter(Named(old, kind, f"c{unit}", 100.0), Named(new, _FLOAT, unit))
-
-
-def _px4(name: str, kind: int = _FLOAT, unit: str = "") -> dict[str, Named]:
-    return {PX4: Named(name, kind, unit)}
-
-
 def _in_mAh(soc: float, facts: Facts) -> int:
     return facts.one.levels.mAh(soc, facts.one.vehicle)
 
@@ -133,247 +106,246 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         "speed",
         lambda f: f.by.speed_mps,
-        _cm("WPNAV_SPEED", "WP_SPD", unit="m/s") | _px4("MPC_XY_CRUISE", unit="m/s"),
+        copter_cm("WPNAV_SPEED", "WP_SPD", unit="m/s") | px4("MPC_XY_CRUISE", unit="m/s"),
     ),
-    Parameter("largest speed", lambda f: f.by.speed_mps, _px4("MPC_XY_VEL_MAX", unit="m/s")),
+    Parameter("largest speed", lambda f: f.by.speed_mps, px4("MPC_XY_VEL_MAX", unit="m/s")),
     Parameter(
         "speed up",
         lambda f: f.by.up_mps,
-        _cm("WPNAV_SPEED_UP", "WP_SPD_UP", unit="m/s") | _px4("MPC_Z_V_AUTO_UP", unit="m/s"),
+        copter_cm("WPNAV_SPEED_UP", "WP_SPD_UP", unit="m/s") | px4("MPC_Z_V_AUTO_UP", unit="m/s"),
     ),
     Parameter(
         "speed down",
         lambda f: f.by.down_mps,
-        _cm("WPNAV_SPEED_DN", "WP_SPD_DN", unit="m/s") | _px4("MPC_Z_V_AUTO_DN", unit="m/s"),
+        copter_cm("WPNAV_SPEED_DN", "WP_SPD_DN", unit="m/s") | px4("MPC_Z_V_AUTO_DN", unit="m/s"),
     ),
     Parameter(
         "acceleration",
         lambda f: f.by.acceleration_mps2,
-        _cm("WPNAV_ACCEL", "WP_ACC", unit="m/s/s") | _px4("MPC_ACC_HOR", unit="m/s/s"),
+        copter_cm("WPNAV_ACCEL", "WP_ACC", unit="m/s/s") | px4("MPC_ACC_HOR", unit="m/s/s"),
     ),
     Parameter(
         "vertical acceleration",
         lambda f: f.by.vertical_mps2,
-        _cm("WPNAV_ACCEL_Z", "WP_ACC_Z", unit="m/s/s"),
+        copter_cm("WPNAV_ACCEL_Z", "WP_ACC_Z", unit="m/s/s"),
     ),
     Parameter(
         "jerk: what the leg model was fitted with",
         lambda _: 1.0,
-        _copter(Named("WPNAV_JERK", _FLOAT, "m/s/s/s"), Named("WP_JERK", _FLOAT, "m/s/s/s")),
+        {
+            COPTER_46: Named("WPNAV_JERK", FLOAT, "m/s/s/s"),
+            COPTER_47: Named("WP_JERK", FLOAT, "m/s/s/s"),
+        },
     ),
     Parameter(
         "how far from a corner it may pass",
         lambda f: f.tolerances.corner_m,
-        _cm("WPNAV_RADIUS", "WP_RADIUS_M") | _px4("NAV_ACC_RAD", unit="m"),
+        copter_cm("WPNAV_RADIUS", "WP_RADIUS_M") | px4("NAV_ACC_RAD", unit="m"),
     ),
     Parameter(
         "last part of a landing: speed",
         lambda _: LAND_MPS,
-        _cm("LAND_SPEED", "LAND_SPD_MS", _INT16, "m/s") | _px4("MPC_LAND_SPEED", unit="m/s"),
+        copter_cm("LAND_SPEED", "LAND_SPD_MS", INT16, "m/s") | px4("MPC_LAND_SPEED", unit="m/s"),
     ),
     Parameter(
         "last part of a landing: height",
         lambda _: LAND_BELOW_M,
-        _cm("LAND_ALT_LOW", "LAND_ALT_LOW_M", _INT16),
+        copter_cm("LAND_ALT_LOW", "LAND_ALT_LOW_M", INT16),
     ),
     Parameter(
         "before it: speed down, as everywhere",
         lambda _: 0.0,
-        _cm("LAND_SPEED_HIGH", "LAND_SPD_HIGH_MS", _INT16, "m/s"),
+        copter_cm("LAND_SPEED_HIGH", "LAND_SPD_HIGH_MS", INT16, "m/s"),
     ),
     Parameter(
         "heading: as the mission says (0), or along its course (3)",
         lambda f: _YAW_ALONG_COURSE if f.one.looks_ahead else _YAW_AS_TOLD,
-        _copter(Named("WP_YAW_BEHAVIOR", _INT8)),
+        copter("WP_YAW_BEHAVIOR", INT8),
     ),
     Parameter(
         "heading: along its course, where the mission says none",
         lambda f: _YAW_ALONG_COURSE if f.one.looks_ahead else None,
-        _px4("MPC_YAW_MODE", _INT32),
+        px4("MPC_YAW_MODE", INT32),
     ),
-    Parameter("fence: on", lambda _: 1, _copter(Named("FENCE_ENABLE", _INT8))),
+    Parameter("fence: on", lambda _: 1, copter("FENCE_ENABLE", INT8)),
     Parameter(
-        "fence: ceiling, circle and polygons",
-        lambda _: ALL_FENCES,
-        _copter(Named("FENCE_TYPE", _INT8)),
+        "fence: ceiling, circle and polygons", lambda _: ALL_FENCES, copter("FENCE_TYPE", INT8)
     ),
     Parameter(
         "ceiling",
         lambda f: f.ceiling_m,
-        _copter(Named("FENCE_ALT_MAX", _FLOAT, "m")) | _px4("GF_MAX_VER_DIST", unit="m"),
+        copter("FENCE_ALT_MAX", FLOAT, "m") | px4("GF_MAX_VER_DIST", unit="m"),
     ),
     Parameter(
         "circle around home that holds the fence",
         lambda f: f.circle_m,
-        _copter(Named("FENCE_RADIUS", _FLOAT, "m")) | _px4("GF_MAX_HOR_DIST", unit="m"),
+        copter("FENCE_RADIUS", FLOAT, "m") | px4("GF_MAX_HOR_DIST", unit="m"),
     ),
     Parameter(
         "below the ceiling, where returns are flown at the highest",
         lambda _: CEILING_MARGIN_M,
-        _copter(Named("FENCE_MARGIN", _FLOAT, "m")),
+        copter("FENCE_MARGIN", FLOAT, "m"),
     ),
     Parameter(
         "outside of the fence or in a zone: RTL (1) or SmartRTL (5), else land",
         lambda f: _FENCE_RTL_OR_LAND if f.returns else _FENCE_SMART_RTL_OR_LAND,
-        _copter(Named("FENCE_ACTION", _INT8)),
+        copter("FENCE_ACTION", INT8),
     ),
-    Parameter("outside of the fence or in a zone: return", lambda _: 3, _px4("GF_ACTION", _INT32)),
+    Parameter("outside of the fence or in a zone: return", lambda _: 3, px4("GF_ACTION", INT32)),
     Parameter(
         "return: height",
         lambda f: f.return_m,
-        _cm("RTL_ALT", "RTL_ALT_M", _INT32) | _px4("RTL_RETURN_ALT", unit="m"),
+        copter_cm("RTL_ALT", "RTL_ALT_M", INT32) | px4("RTL_RETURN_ALT", unit="m"),
     ),
     Parameter(
         "return: no lower close to home",
         lambda _: 0.0,
-        _copter(Named("RTL_CONE_SLOPE")) | _px4("RTL_CONE_ANG", _INT32, "deg"),
+        copter("RTL_CONE_SLOPE") | px4("RTL_CONE_ANG", INT32, "deg"),
     ),
-    Parameter("return: above home", lambda _: 0, _copter(Named("RTL_ALT_TYPE", _INT8))),
+    Parameter("return: above home", lambda _: 0, copter("RTL_ALT_TYPE", INT8)),
     Parameter(
-        "return: no further climb", lambda _: 0.0, _cm("RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", _INT16)
+        "return: no further climb",
+        lambda _: 0.0,
+        copter_cm("RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", INT16),
     ),
     Parameter(
         "return: at the speed above",
         lambda _: 0.0,
-        _cm("RTL_SPEED", "RTL_SPEED_MS", _INT16, "m/s"),
+        copter_cm("RTL_SPEED", "RTL_SPEED_MS", INT16, "m/s"),
     ),
-    Parameter("return: land", lambda _: 0.0, _cm("RTL_ALT_FINAL", "RTL_ALT_FINAL_M", _INT16)),
+    Parameter("return: land", lambda _: 0.0, copter_cm("RTL_ALT_FINAL", "RTL_ALT_FINAL_M", INT16)),
     Parameter(
         "return: land at once",
         lambda _: 0.0,
-        _copter(Named("RTL_LOIT_TIME", _INT32, "ms", 1000.0)) | _px4("RTL_LAND_DELAY", unit="s"),
+        copter("RTL_LOIT_TIME", INT32, "ms", 1000.0) | px4("RTL_LAND_DELAY", unit="s"),
     ),
     Parameter(
         "return: height from which it lands",
         lambda f: min(LAND_BELOW_M, f.return_m),
-        _px4("RTL_DESCEND_ALT", unit="m"),
+        px4("RTL_DESCEND_ALT", unit="m"),
     ),
     Parameter(
         "return: straight (0), or along the mission (4)",
         lambda f: _PX4_DIRECT if f.returns else _PX4_BY_MISSION,
-        _px4("RTL_TYPE", _INT32),
+        px4("RTL_TYPE", INT32),
     ),
     Parameter(
         "return: to home; 0 where it was closed",
         lambda f: 0 if f.one.track.lands_elsewhere else 1,
-        _copter(Named("RALLY_INCL_HOME", _INT8)),
+        copter("RALLY_INCL_HOME", INT8),
     ),
     Parameter(
         "return: to the rally point, however far, where home was closed",
         lambda f: 0.0 if f.one.track.lands_elsewhere else None,
-        _copter(Named("RALLY_LIMIT_KM", _FLOAT, "km")),
+        copter("RALLY_LIMIT_KM", FLOAT, "km"),
     ),
     Parameter(
         "SmartRTL: how close to its way it flies back",
         lambda f: None if f.returns else 2.0,
-        _copter(Named("SRTL_ACCURACY", _FLOAT, "m")),
+        copter("SRTL_ACCURACY", FLOAT, "m"),
     ),
     Parameter(
         "SmartRTL: points that it remembers (restart the vehicle once)",
         lambda f: None if f.returns else 500,
-        _copter(Named("SRTL_POINTS", _INT16)),
+        copter("SRTL_POINTS", INT16),
     ),
     Parameter(
         "battery: what is in the pack when it is put in",
         lambda f: f.one.levels.capacity_mAh,
-        _copter(Named("BATT_CAPACITY", _INT32, "mAh")),
+        copter("BATT_CAPACITY", INT32, "mAh"),
     ),
     Parameter(
         "low: what the way home takes at its worst, and a reserve",
         lambda f: _in_mAh(f.one.levels.low_soc, f),
-        _copter(Named("BATT_LOW_MAH", _FLOAT, "mAh")),
+        copter("BATT_LOW_MAH", FLOAT, "mAh"),
     ),
     Parameter(
         "low: as a voltage, for a pack that holds less than it should",
         lambda f: math.ceil(100.0 * f.one.levels.low_V) / 100.0,
-        _copter(Named("BATT_LOW_VOLT", _FLOAT, "V")),
+        copter("BATT_LOW_VOLT", FLOAT, "V"),
     ),
     Parameter(
         "low: RTL (2), or SmartRTL or land (4)",
         lambda f: _RTL if f.returns else _SMART_RTL_OR_LAND,
-        _copter(Named("BATT_FS_LOW_ACT", _INT8)),
+        copter("BATT_FS_LOW_ACT", INT8),
     ),
     Parameter(
         "critical: what a landing takes",
         lambda f: _in_mAh(f.one.levels.critical_soc, f),
-        _copter(Named("BATT_CRT_MAH", _FLOAT, "mAh")),
+        copter("BATT_CRT_MAH", FLOAT, "mAh"),
     ),
     Parameter(
         "critical: as a voltage",
         lambda f: math.ceil(100.0 * f.one.levels.critical_V - 1e-9) / 100.0,
-        _copter(Named("BATT_CRT_VOLT", _FLOAT, "V")),
+        copter("BATT_CRT_VOLT", FLOAT, "V"),
     ),
-    Parameter("critical: land", lambda _: _LAND, _copter(Named("BATT_FS_CRT_ACT", _INT8))),
-    Parameter(
-        "voltages count after so long", lambda _: 10, _copter(Named("BATT_LOW_TIMER", _INT8, "s"))
-    ),
-    Parameter("voltages are those measured", lambda _: 0, _copter(Named("BATT_FS_VOLTSRC", _INT8))),
+    Parameter("critical: land", lambda _: _LAND, copter("BATT_FS_CRT_ACT", INT8)),
+    Parameter("voltages count after so long", lambda _: 10, copter("BATT_LOW_TIMER", INT8, "s")),
+    Parameter("voltages are those measured", lambda _: 0, copter("BATT_FS_VOLTSRC", INT8)),
     Parameter(
         "no arming with a pack less full than planned, at rest",
         lambda f: math.floor(100.0 * f.one.levels.rest_V) / 100.0,
-        _copter(Named("BATT_ARM_VOLT", _FLOAT, "V")),
+        copter("BATT_ARM_VOLT", FLOAT, "V"),
     ),
     Parameter(
         "battery: capacity",
         lambda f: 1000.0 * f.one.vehicle.battery.capacity_Ah,
-        _px4("BAT1_CAPACITY", unit="mAh"),
+        px4("BAT1_CAPACITY", unit="mAh"),
     ),
-    Parameter("battery: cells", _cells, _px4("BAT1_N_CELLS", _INT32)),
+    Parameter("battery: cells", _cells, px4("BAT1_N_CELLS", INT32)),
     Parameter(
         "battery: a cell that is full",
         lambda f: f.one.vehicle.battery.ocv_V[0] / _cells(f),
-        _px4("BAT1_V_CHARGED", unit="V"),
+        px4("BAT1_V_CHARGED", unit="V"),
     ),
     Parameter(
         "battery: a cell that is empty, in flight",
         lambda f: f.one.vehicle.battery.voltage_min_V / _cells(f),
-        _px4("BAT1_V_EMPTY", unit="V"),
+        px4("BAT1_V_EMPTY", unit="V"),
     ),
     Parameter(
         "warning, before it is low",
         lambda f: f.one.levels.low_soc + _PX4_WARNS_EARLIER,
-        _px4("BAT_LOW_THR"),
+        px4("BAT_LOW_THR"),
     ),
     Parameter(
         "low: what the way home takes at its worst, and a reserve",
         lambda f: f.one.levels.low_soc,
-        _px4("BAT_CRIT_THR"),
+        px4("BAT_CRIT_THR"),
     ),
     Parameter(
         "critical: what a landing takes",
         lambda f: f.one.levels.critical_soc,
-        _px4("BAT_EMERGEN_THR"),
+        px4("BAT_EMERGEN_THR"),
     ),
-    Parameter("low: return; critical: land", lambda _: 3, _px4("COM_LOW_BAT_ACT", _INT32)),
+    Parameter("low: return; critical: land", lambda _: 3, px4("COM_LOW_BAT_ACT", INT32)),
     Parameter(
         "no radio control, in any mode but AUTO: RTL (1), or SmartRTL or land (5)",
         lambda f: _FS_RTL if f.returns else _THR_SMART_RTL_OR_LAND,
-        _copter(Named("FS_THR_ENABLE", _INT8)),
+        copter("FS_THR_ENABLE", INT8),
     ),
     Parameter(
         "no ground station, likewise: RTL (1), or SmartRTL or land (4)",
         lambda f: _FS_RTL if f.returns else _GCS_SMART_RTL_OR_LAND,
-        _copter(Named("FS_GCS_ENABLE", _INT8)),
+        copter("FS_GCS_ENABLE", INT8),
     ),
     Parameter(
-        "no ground station: after so long",
-        lambda _: 5.0,
-        _copter(Named("FS_GCS_TIMEOUT", _FLOAT, "s")),
+        "no ground station: after so long", lambda _: 5.0, copter("FS_GCS_TIMEOUT", FLOAT, "s")
     ),
     Parameter(
         "without either, a mission in AUTO and a landing go on",
         lambda _: _GOES_ON,
-        _copter(Named("FS_OPTIONS", _INT32)),
+        copter("FS_OPTIONS", INT32),
     ),
-    Parameter("no radio control: return", lambda _: 2, _px4("NAV_RCL_ACT", _INT32)),
+    Parameter("no radio control: return", lambda _: 2, px4("NAV_RCL_ACT", INT32)),
     Parameter(
-        "but a mission and a return go on without it", lambda _: 3, _px4("COM_RCL_EXCEPT", _INT32)
+        "but a mission and a return go on without it", lambda _: 3, px4("COM_RCL_EXCEPT", INT32)
     ),
-    Parameter("no ground station: fly on", lambda _: 0, _px4("NAV_DLL_ACT", _INT32)),
-    Parameter("no way of its own round zones", lambda _: 0, _copter(Named("OA_TYPE", _INT8))),
-    Parameter("place not known: land", lambda _: 1, _copter(Named("FS_EKF_ACTION", _INT8))),
-    Parameter("place not known: from when on", lambda _: 0.8, _copter(Named("FS_EKF_THRESH"))),
-    Parameter("no flight by dead reckoning", lambda _: 0, _copter(Named("FS_DR_ENABLE", _INT8))),
+    Parameter("no ground station: fly on", lambda _: 0, px4("NAV_DLL_ACT", INT32)),
+    Parameter("no way of its own round zones", lambda _: 0, copter("OA_TYPE", INT8)),
+    Parameter("place not known: land", lambda _: 1, copter("FS_EKF_ACTION", INT8)),
+    Parameter("place not known: from when on", lambda _: 0.8, copter("FS_EKF_THRESH")),
+    Parameter("no flight by dead reckoning", lambda _: 0, copter("FS_DR_ENABLE", INT8)),
 )
 
 
@@ -394,7 +366,7 @@ def parameters_of(facts: Facts, firmware: str | None) -> list[tuple[Named, float
             if key in parameter.names:
                 named = parameter.names[key]
                 scaled = named.scale * value
-                found[named.name] = named, scaled if named.kind == _FLOAT else round(scaled)
+                found[named.name] = named, scaled if named.kind == FLOAT else round(scaled)
     return list(found.values())
 
 

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from uas_coverage_env.operations.mission_export.mission_file import MissionFile
 from uas_coverage_env.operations.mission_export.scheduling import FlightFiles
 
-Flown = Sequence[tuple[FlightFiles, MissionFile]]
+UasFiles = Sequence[tuple[FlightFiles, MissionFile]]
+"""The sorties of one UAS in their order, each with the flight that it is part of."""
 
 
-def kml_text(name: str, flown: Flown) -> str:
+def kml_text(name: str, flown: UasFiles) -> str:
     """The flown samples and the legs, altitudes relative to the ground.
 
     Args:
@@ -38,7 +39,7 @@ def kml_text(name: str, flown: Flown) -> str:
     return "\n".join([*lines, "</Document></kml>\n"])
 
 
-def geojson_text(name: str, flown: Flown) -> str:
+def geojson_text(name: str, flown: UasFiles) -> str:
     """The same as lines whose third coordinate is the height above the ground of home [m].
 
     Args:
@@ -65,7 +66,7 @@ def geojson_text(name: str, flown: Flown) -> str:
     return json.dumps({"type": "FeatureCollection", "features": features}) + "\n"
 
 
-def csv_text(name: str, flown: Flown) -> str:
+def csv_text(name: str, flown: UasFiles) -> str:
     """The flown samples: time, place in degrees, height above the ground of home, sortie, battery.
 
     Between two sorties of one flight a UAS stands where it has landed: these samples are there,
@@ -107,7 +108,7 @@ class _Line(NamedTuple):
     places: list[Any]
 
 
-def _lines(flown: Flown) -> Iterator[_Line]:
+def _lines(flown: UasFiles) -> Iterator[_Line]:
     for _, one in flown:
         shown: tuple[tuple[str, NDArray[np.float64]], ...] = (
             ("flown", one.track.flown_m),
