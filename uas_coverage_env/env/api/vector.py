@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Unpack
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
@@ -30,6 +30,9 @@ from uas_coverage_env.env.report import FILTERED, STATUS
 from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.scenario import Scenario, ScenarioLike
 from uas_coverage_env.world import ABSENT, Command
+
+if TYPE_CHECKING:
+    from uas_coverage_env.env.gpu.missions import CudaMissions
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next_step",
@@ -418,8 +421,9 @@ def vector_env(
     threads: int = 1,
     copy: bool = True,
     render_mode: str | None = None,
+    device: Literal["cpu", "cuda"] = "cpu",
     **settings: Unpack[MissionKeywords],
-) -> CoverageVectorEnv:
+) -> "CoverageVectorEnv | CudaMissions":
     """Many missions at once; the same as `gymnasium.make_vec("UASCoverage-v0", num_envs)`.
 
     Args:
@@ -429,6 +433,8 @@ def vector_env(
         threads: How many of numba's threads share the missions.
         copy: Whether observations are arrays of their own.
         render_mode: None, "rgb_array", "rgb_array_tiled" or "human".
+        device: "cpu"; or "cuda": on a GPU (extra `gpu`), see `CudaMissions`, whose arrays stay
+            there and are always overwritten.
         action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
@@ -451,13 +457,16 @@ def vector_env(
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
+        ImportError: "cuda", and numba-cuda is not installed.
+        RuntimeError: "cuda", and there is no GPU.
     """
-    return CoverageVectorEnv(
-        num_envs,
-        scenario,
-        autoreset_mode=autoreset_mode,
-        threads=threads,
-        copy=copy,
-        render_mode=render_mode,
-        **settings,
-    )
+    both: dict[str, Any] = {
+        "autoreset_mode": autoreset_mode, "threads": threads, "render_mode": render_mode, **settings
+    }  # fmt: skip
+    if device == "cuda":
+        from uas_coverage_env.env.gpu.missions import CudaMissions
+
+        return CudaMissions(num_envs, scenario, **both)
+    if device != "cpu":
+        raise ValueError(f"device is {device!r}; it is one of cpu, cuda")
+    return CoverageVectorEnv(num_envs, scenario, copy=copy, **both)

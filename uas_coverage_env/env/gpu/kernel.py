@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory
-from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.batch.kernel import fly_lane_with, scratch_of
 from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP
 from uas_coverage_env.env.batch.pool import learners_of
@@ -57,18 +56,18 @@ def _is_due(state):
 
 
 @cache
-def _write_commands_with(kind: ActionKind) -> Any:
-    """`act.write_commands_with` of one kind of any origin."""
-    write = kind.write
+def _write_commands_with(write: Any, own: bool) -> Any:
+    """`act.write_commands_with` of one kernel, of a kind of the version or of one's own."""
 
     @inlined_kernel
     def write_commands(arena, state, tables, learners, scratch, acting):
         for i in range(scratch.commands.shape[0]):
             begin_command(tables, learners, scratch, acting, i)
-            if state.uas[i].status == FLYING:
+            if not own or state.uas[i].status == FLYING:
                 command, values = scratch.commands[i], scratch.values[i]
                 write(arena, state, tables, learners, i, acting.parameters, values, command)
-                refuse_unflyable(arena, learners, acting, i, command)
+                if own:
+                    refuse_unflyable(arena, learners, acting, i, command)
 
     return write_commands
 
@@ -105,8 +104,10 @@ def step_with(
         `step_batch`, and observations are written where those of the step before lie.
     """
     nonlinear, width = settings.dynamics == "nonlinear", settings.observation_size
+    write = settings.kind.write
+    own = all(write is not kind.write for kind in settings.version.actions)
     step_learners = step_learners_of(
-        _write_commands_with(settings.kind),
+        _write_commands_with(write, own),
         advance_of(features, nonlinear or otherwise),
         compute_rewards_with(settings.reward, calls=False),
         observe_one_with(settings.observation, calls=False),
@@ -151,3 +152,12 @@ def _launched(fly_lane: Any, is_refused: Any, nonlinear: bool, width: int, chang
             )
 
     return step
+
+
+@cuda.jit
+def take_actions(given, asked):
+    """Copy actions of any floats; numba's own way waits until it is done."""
+    lane = cuda.grid(1)  # pyrefly: ignore[missing-argument]
+    if lane < asked.shape[0]:
+        for k in range(asked.shape[1]):
+            asked[lane, k] = given[lane, k]

@@ -38,7 +38,7 @@ from uas_coverage_env.env.gpu.device import (
     write,
     write_lane,
 )
-from uas_coverage_env.env.gpu.kernel import MARKS, Marks, step_with
+from uas_coverage_env.env.gpu.kernel import MARKS, Marks, step_with, take_actions
 from uas_coverage_env.env.gpu.refused import Given, refuse
 from uas_coverage_env.env.observation import observation_bounds
 from uas_coverage_env.env.versions import V0, Version
@@ -138,6 +138,7 @@ class CudaMissions:
             told, pool.features, pool.sizes["true vehicles"] > 0, pool.changes
         )
         self._observing = observing_of(told.observation, version.observation)  # on the host
+        self._blocks = -(-num_envs // THREADS_PER_BLOCK), THREADS_PER_BLOCK
         self._begun = False
 
         lanes, learners = self.missions.lanes, self.missions.learners
@@ -198,10 +199,9 @@ class CudaMissions:
             raise ResetNeeded("step() before reset(): call reset() first")
         if is_on_device(actions):
             given = as_device_array(actions)
-            asked = self.asked if given.ndim == 2 else self.missions.learners.asked
-            if given.shape != asked.shape:
+            if given.shape != self.asked.shape:
                 raise ValueError(f"actions have shape {given.shape}; give {self.asked.shape}")
-            asked[:] = given
+            take_actions[self._blocks](given, self.asked)
         elif actions is not None:
             here = np.zeros(self.missions.learners.asked.shape)
             accept_of_lanes(self._pool.actions, actions, here)
@@ -245,8 +245,9 @@ class CudaMissions:
         self._begun = bool((state["mission"] >= 0).all())
 
     def _launch(self) -> None:
-        step = self._launched[-(-self.num_envs // THREADS_PER_BLOCK), THREADS_PER_BLOCK]
-        step(self._pool_there, self.missions, self._marks, *self._parts, self._rows)
+        self._launched[self._blocks](
+            self._pool_there, self.missions, self._marks, *self._parts, self._rows
+        )
 
     def _change_scenes(self) -> None:
         """Lay out anew on the host, as a batch does, the scenes that change at this sample."""
