@@ -32,6 +32,7 @@ from uas_coverage_env.env import (
 from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
 from uas_coverage_env.env.api.aec import in_turns
 from uas_coverage_env.env.api.documentation import with_settings_written_out
+from uas_coverage_env.env.gpu.refused import REFUSED
 from uas_coverage_env.env.observation import (
     OBSERVATION,
     OBSERVATION_SIZE,
@@ -375,6 +376,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "event_fields": event_fields,
     "families": families_table,
     "planners": planners,
+    "not_on_a_gpu": lambda: table(
+        ("does not run on a GPU", "instead"), [(row.what, row.instead) for row in REFUSED]
+    ),
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
     **{name: of_operations(room, name) for room, names in OPERATIONS.items() for name in names},
 }

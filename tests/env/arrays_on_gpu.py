@@ -70,8 +70,8 @@ def seeded():
         env.reset(seed=seed)
         batch.reset(seed)
         lanes, own = batch.lanes, env.missions.lanes
-        found.append([[*map(int, own.seed)], [*map(int, own.mission)]])
-        found[-1].append(bool((own.seed == lanes.seed).all() & (own.mission == lanes.mission).all()))
+        equal = (own.seed == lanes.seed).all() and (own.mission == lanes.mission).all()
+        found.append([[*map(int, own.seed)], [*map(int, own.mission)], bool(equal)])
     return found
 
 

@@ -40,9 +40,7 @@ def compare_all():
         "numbers": compare(
             GROUND, lambda k: rng.uniform(-1, 1, (N_LANES, 2, 3)), 8, action=CLIMB_RATE
         ),
-        "choices": compare(
-            GROUND, lambda k: rng.integers(0, 3, (N_LANES, 2)), 8, action=CHOICES
-        ),
+        "choices": compare(GROUND, lambda k: rng.integers(0, 3, (N_LANES, 2)), 8, action=CHOICES),
         "not finite": refused_of(CLIMB_RATE, [[0.0] * 5 + [np.nan], [0.1] * 6]),
         "no choice": refused_of(CHOICES, [[0.0, 3.0], [1.0, 2.0]]),
         "half a choice": refused_of(CHOICES, [[0.0, 1.0], [0.5, 2.0]]),

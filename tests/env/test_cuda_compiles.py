@@ -55,20 +55,20 @@ def missions(request, monkeypatch):
 
 
 def arguments(missions):
-    """What the step of all lanes is handed."""
-    return missions._pool_there, missions.missions, missions._marks, *missions._parts, missions._rows
+    """The types of what the step of all lanes is handed."""
+    given = missions._pool_there, missions.missions, missions._marks, *missions._parts
+    return tuple(map(typeof, (*given, missions._rows)))
 
 
 def test_numba_finds_the_types_of_all_that_the_step_calls(missions):
     # on the simulated GPU it runs as Python, which asks for none
     step_lane = getclosurevars(missions._launched.py_func).nonlocals["step_lane"]
-    step_lane.compile((*map(typeof, arguments(missions)), types.int64))
+    step_lane.compile((*arguments(missions), types.int64))
 
 
 def test_the_step_compiles_for_a_gpu(compiler, missions):
     from numba.cuda import compile_ptx
 
-    given = tuple(map(typeof, arguments(missions)))
-    code, _ = compile_ptx(missions._launched.py_func, given, cc=COMPUTE_CAPABILITY)
+    code, _ = compile_ptx(missions._launched.py_func, arguments(missions), cc=COMPUTE_CAPABILITY)
     assert ".visible .entry" in code
     assert ".extern .func" not in code  # all that is called is there

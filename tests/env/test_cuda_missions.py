@@ -3,6 +3,7 @@ import re
 import numba
 import pytest
 from changing_missions import EVENTS, EVERYTHING, mission
+from own_actions_on_gpu import CHOICES
 from scenes_on_gpu import EVERY_KIND
 
 from uas_coverage_env import ContactKind, uas_coverage_v0
@@ -101,7 +102,7 @@ ASKED_FOR = {
     "a sequence": (["village", "village"], {}),
     "sends UAS home": (SENT_HOME[0], {}),
     "autoreset_mode": ("village", {"autoreset_mode": "SameStep"}),
-    "mask_in_observation": ("village", {"mask_in_observation": True, "action": "choices"}),
+    "mask_in_observation": ("village", {"mask_in_observation": True, "action": CHOICES}),
     "images_apart": ("village", {"images_apart": True, "observation": "grid"}),
     "flat_infos": ("village", {"flat_infos": True}),
     "render_mode": ("village", {"render_mode": "rgb_array"}),
@@ -112,10 +113,6 @@ ASKED_FOR = {
 @pytest.mark.parametrize("name", ASKED_FOR)
 def test_what_does_not_run_on_a_gpu_is_refused_in_one_line(name):
     scenario, settings = ASKED_FOR[name]
-    if settings.get("action") == "choices":
-        from own_actions_on_gpu import CHOICES
-
-        settings = {**settings, "action": CHOICES}
     with pytest.raises(ValueError, match=r"not on a GPU: .*") as error:
         uas_coverage_v0.vector_env(2, scenario, device="cuda", **settings)
     (row,) = (row for row in REFUSED if row.what.replace("`", "") in str(error.value))
@@ -125,8 +122,8 @@ def test_what_does_not_run_on_a_gpu_is_refused_in_one_line(name):
 
 
 def test_each_row_of_the_table_is_asked_for_above():
-    found = {next(row.what for row in REFUSED if name in row.what.replace("`", "")) for name in ASKED_FOR}
-    assert found == {row.what for row in REFUSED}
+    for row in REFUSED:
+        assert any(name in row.what.replace("`", "") for name in ASKED_FOR)
 
 
 def test_without_a_gpu_it_is_said_what_to_install(monkeypatch):

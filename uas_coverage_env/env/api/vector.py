@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Unpack, overload
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
@@ -410,6 +410,30 @@ class CoverageVectorEnv(VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         self._tiles.see(batch.lanes.mission.tolist(), batch.scenario_of, batch.worlds.x[:, :, :3])
         if self.render_mode == "human":
             self.render()
+
+
+@overload
+def vector_env(
+    num_envs: int = 1,
+    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
+    *,
+    device: Literal["cuda"],
+    **settings: Unpack[MissionKeywords],
+) -> "CudaMissions": ...
+
+
+@overload
+def vector_env(
+    num_envs: int = 1,
+    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
+    *,
+    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    threads: int = 1,
+    copy: bool = True,
+    render_mode: str | None = None,
+    device: Literal["cpu"] = "cpu",
+    **settings: Unpack[MissionKeywords],
+) -> CoverageVectorEnv: ...
 
 
 @takes_settings

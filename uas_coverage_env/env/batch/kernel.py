@@ -303,9 +303,7 @@ def fly_lane_with(step_learners: Any, begin_features: Any, *, fetches: bool) -> 
     begin_lane = begin_lane_with(begin_features)
 
     @inlined_kernel
-    def fly_lane(
-        pool, missions, rules, lane, order, thread, autoreset, before, observation, width
-    ):
+    def fly_lane(pool, missions, rules, lane, order, thread, autoreset, before, observation, width):
         lanes = missions.lanes
         if rarely(order == REST):
             whole = (observation.shape[1], width)
@@ -364,9 +362,7 @@ def step_lane_with(version: Version) -> Any:
     @kernel
     def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
         pool, missions, rules = _take(kept)
-        fly_lane(
-            pool, missions, rules, lane, order, thread, autoreset, before, observation, width
-        )
+        fly_lane(pool, missions, rules, lane, order, thread, autoreset, before, observation, width)
 
     return step_lane
 

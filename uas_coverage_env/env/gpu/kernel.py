@@ -147,17 +147,17 @@ def _launched(fly_lane: Any, is_refused: Any, nonlinear: bool, width: int, chang
     def step(pool, missions, marks, acting, paying, observing, observation):
         lane = cuda.grid(1)  # pyrefly: ignore[missing-argument]
         if lane < marks.ended.shape[0]:
-            step_lane(
-                pool, missions, marks, acting, paying, observing, observation, lane
-            )
+            step_lane(pool, missions, marks, acting, paying, observing, observation, lane)
 
     return step
 
 
-@cuda.jit
-def take_actions(given, asked):
-    """Copy actions of any floats; numba's own way waits until it is done."""
+def _take_actions(given, asked):
     lane = cuda.grid(1)  # pyrefly: ignore[missing-argument]
     if lane < asked.shape[0]:
         for k in range(asked.shape[1]):
             asked[lane, k] = given[lane, k]
+
+
+take_actions: Any = cuda.jit(_take_actions)
+"""Copies actions of any floats, to be launched; numba's own way waits until it is done."""

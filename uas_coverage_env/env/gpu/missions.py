@@ -114,8 +114,8 @@ class CudaMissions:
         self.num_envs = num_envs
         self._pool = pool = ScenarioPool(scenario, told, lanes=num_envs)
         self.n_uas = n_uas = pool.sizes["U"]
-        bounds = (np.tile(bound, n_uas) for bound in observation_bounds(told.observation))
-        self.single_observation_space = spaces.Box(*bounds, dtype=np.float32)
+        low, high = (np.tile(bound, n_uas) for bound in observation_bounds(told.observation))
+        self.single_observation_space = spaces.Box(low, high, dtype=np.float32)
         self.single_action_space = pool.actions.joint_space(n_uas)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)

@@ -9,7 +9,6 @@ from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world.events import goes_home
 
-
 _OWN_MODE = (AutoresetMode.NEXT_STEP, AutoresetMode.NEXT_STEP.value)
 
 
@@ -58,12 +57,12 @@ REFUSED = (
     ),
     Refusal(
         "`mask_in_observation`",
-        "leave it out: masks follow from `missions.learners.candidates`",
+        "leave it out: the mask of your kind of action takes `missions.learners.candidates`",
         lambda given: given.settings.mask_in_observation,
     ),
     Refusal(
         "`images_apart`",
-        "leave it out: pictures are columns of the observation, `view` takes them out",
+        "leave it out: pictures are columns of the observation",
         lambda given: given.settings.images_apart,
     ),
     Refusal(
