@@ -1,4 +1,5 @@
 import re
+from typing import Any
 
 import numba
 import pytest
@@ -11,6 +12,8 @@ from uas_coverage_env.env.gpu.refused import REFUSED
 from uas_coverage_env.scenario import GeneratedScenarios
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.world import SWAPPING
+
+vector_env: Any = uas_coverage_v0.vector_env
 
 
 def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_a_batch(flown_on_gpu):
@@ -114,7 +117,7 @@ ASKED_FOR = {
 def test_what_does_not_run_on_a_gpu_is_refused_in_one_line(name):
     scenario, settings = ASKED_FOR[name]
     with pytest.raises(ValueError, match=r"not on a GPU: .*") as error:
-        uas_coverage_v0.vector_env(2, scenario, device="cuda", **settings)
+        vector_env(2, scenario, device="cuda", **settings)
     (row,) = (row for row in REFUSED if row.what.replace("`", "") in str(error.value))
     assert name in str(error.value)
     assert row.instead.replace("`", "") in str(error.value)
@@ -131,14 +134,14 @@ def test_without_a_gpu_it_is_said_what_to_install(monkeypatch):
 
     monkeypatch.setattr(device, "find_spec", lambda name: None)
     with pytest.raises(ImportError, match=re.escape('pip install "uas-coverage-env[gpu]"')):
-        uas_coverage_v0.vector_env(2, device="cuda")
+        vector_env(2, device="cuda")
     monkeypatch.setattr(device, "find_spec", lambda name: name)
     if numba.cuda.is_available():
         pytest.skip("there is a GPU")
     with pytest.raises(RuntimeError, match="needs an NVIDIA GPU"):
-        uas_coverage_v0.vector_env(2, device="cuda")
+        vector_env(2, device="cuda")
 
 
 def test_there_are_two_devices():
     with pytest.raises(ValueError, match="device is 'gpu'; it is one of cpu, cuda"):
-        uas_coverage_v0.vector_env(2, device="gpu")
+        vector_env(2, device="gpu")
