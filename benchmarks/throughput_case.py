@@ -120,24 +120,24 @@ def _village_cuda(num_envs: int, threads: int) -> Steps:
     import numpy as np
     from numba import cuda
 
-    from uas_coverage_env.env.gpu.missions import CudaMissions
+    from uas_coverage_env import uas_coverage_v0
 
-    flown = CudaMissions(num_envs)
-    acted: Any = flown.missions.acted  # on the GPU
+    flown: Any = uas_coverage_v0.vector_env(num_envs, device="cuda")
+    flown.reset(seed=0)
     rng = np.random.default_rng(0)
     # actions lie on the GPU already, as those of a learner there would
     drawn = [
-        cuda.to_device(rng.uniform(-1, 1, flown.missions.learners.asked.shape))
+        cuda.to_device(rng.uniform(-1, 1, flown.asked.shape).astype(np.float32))
         for _ in range(N_ON_GPU)
     ]
 
     def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
-        before = int(acted.copy_to_host().sum())
+        before = int(flown.acted.copy_to_host().sum())
         for step in range(n_steps):
             flown.step(drawn[step % N_ON_GPU])
         cuda.synchronize()
         return lambda: (
-            int(acted.copy_to_host().sum()) - before,
+            int(flown.acted.copy_to_host().sum()) - before,
             n_steps * num_envs * N_AGENTS,
         )
 

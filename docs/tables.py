@@ -36,6 +36,7 @@ from uas_coverage_env.env.api.aec import in_turns
 from uas_coverage_env.env.api.documentation import with_settings_written_out
 from uas_coverage_env.env.batch.memory import FINAL, LANES
 from uas_coverage_env.env.episode.memory import LEARNERS
+from uas_coverage_env.env.gpu.refused import REFUSED
 from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE, full_state, grid, local
 from uas_coverage_env.env.observation.layout import layout_table
 from uas_coverage_env.env.rendering.screen import RENDER_MODES
@@ -411,6 +412,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "planners": planners,
     "figures": flight_figures,
     "comparison_columns": comparison_columns,
+    "not_on_a_gpu": lambda: table(
+        ("does not run on a GPU", "instead"), [(row.what, row.instead) for row in REFUSED]
+    ),
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
     **{name: partial(of_operations, name) for name in OPERATIONS},
 }

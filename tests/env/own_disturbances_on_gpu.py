@@ -1,7 +1,7 @@
-"""Own disturbances on numba's simulated GPU, and the same as episodes: see `simulated_gpu`."""
+"""Own disturbances on numba's simulated GPU, and the same in a batch: see `simulated_gpu`."""
 
 import numpy as np
-from beside_episodes import compare
+from beside_batches import compare
 from own_actions import CLIMB_RATE
 from own_disturbances import drained, gusts, perturbed, push, weak_rotors
 from practice_grounds import practice_ground

@@ -1,16 +1,18 @@
 """The step of a GPU, compiled without one: by numba, and by NVIDIA's compiler where it is there."""
 
-from inspect import getclosurevars, signature
+from inspect import getclosurevars
 from types import SimpleNamespace
 
 import own_disturbances_on_gpu
 import pytest
 from changing_missions import EVENTS, mission
-from numba import typeof
+from numba import typeof, types
 from own_actions import CLIMB_RATE
+from own_blocks import SLOW, beacon
 
-from uas_coverage_env.compiled.internals import KernelDispatcher
+from uas_coverage_env.env import REWARD, grid
 from uas_coverage_env.env.gpu import missions as missions_on_gpu
+from uas_coverage_env.env.observation.named import OBSERVATIONS
 
 COMPUTE_CAPABILITY = (8, 0)
 
@@ -33,34 +35,41 @@ def compiler(monkeypatch):
     monkeypatch.setattr(dispatcher, "get_current_device", lambda: there)
 
 
-@pytest.fixture(params=["as_usual", "with_own_blocks"])
+OWN = {
+    "as_usual": {},
+    "with_own_disturbances": {"disturbances": own_disturbances_on_gpu.OWN, "action": CLIMB_RATE},
+    "with_own_blocks": {
+        "observation": (*OBSERVATIONS["local"], grid(4), beacon(0.0, 0.0)),
+        "reward": (*REWARD, SLOW),
+    },
+}
+
+
+@pytest.fixture(params=OWN)
 def missions(request, monkeypatch):
     """Missions whose arrays stay on the host."""
+    monkeypatch.setattr(missions_on_gpu, "check_gpu", lambda: None)
     monkeypatch.setattr(missions_on_gpu, "on_device", lambda arrays: arrays)
-    if request.param == "as_usual":
-        return missions_on_gpu.CudaMissions(2, mission(EVENTS[0]))
-    own = own_disturbances_on_gpu
-    return missions_on_gpu.CudaMissions(2, own.GROUND, disturbances=own.OWN, action=CLIMB_RATE)
+    disturbed = request.param == "with_own_disturbances"
+    ground = own_disturbances_on_gpu.GROUND if disturbed else mission(EVENTS[0])
+    return missions_on_gpu.CudaMissions(2, ground, **OWN[request.param])
+
+
+def arguments(missions):
+    """The types of what the step of all lanes is handed."""
+    given = missions._pool_there, missions.missions, missions._marks, *missions._parts
+    return tuple(map(typeof, (*given, missions._rows)))
 
 
 def test_numba_finds_the_types_of_all_that_the_step_calls(missions):
     # on the simulated GPU it runs as Python, which asks for none
-    step = missions._launched.py_func
-    given = (missions._pool_there, *missions._arguments, 0)
-    names = (*signature(step).parameters, "lane")
-    types = {name: typeof(value) for name, value in zip(names, given, strict=True)}
-    named = getclosurevars(step)
-    parts = {*named.nonlocals.values(), *named.globals.values()}
-    called = [part for part in parts if isinstance(part, KernelDispatcher)]
-    assert len(called) == 5
-    for kernel in called:
-        kernel.compile(tuple(types[name] for name in signature(kernel.py_func).parameters))
+    step_lane = getclosurevars(missions._launched.py_func).nonlocals["step_lane"]
+    step_lane.compile((*arguments(missions), types.int64))
 
 
 def test_the_step_compiles_for_a_gpu(compiler, missions):
-    given = [typeof(argument) for argument in (missions._pool_there, *missions._arguments)]
     from numba.cuda import compile_ptx
 
-    code, _ = compile_ptx(missions._launched.py_func, tuple(given), cc=COMPUTE_CAPABILITY)
+    code, _ = compile_ptx(missions._launched.py_func, arguments(missions), cc=COMPUTE_CAPABILITY)
     assert ".visible .entry" in code
     assert ".extern .func" not in code  # all that is called is there

@@ -11,7 +11,6 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import uas_coverage_v0
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.gpu.missions import CudaMissions
 from uas_coverage_env.features import constant_wind, disturbances_of
 from uas_coverage_env.scenario import Uncertainty, Wind, with_disturbances
 
@@ -202,7 +201,6 @@ def test_what_does_not_fit_is_refused():
     cases = [
         (lambda: CoverageBatch(2, GROUND, disturbances="wind"), "disturbances"),
         (lambda: uas_coverage_v0.parallel_env(GROUND, disturbances=(gusts(), other)), "of its own"),
-        (lambda: CudaMissions(2, GROUND, seed=-1), "seed is -1"),
     ]
     for case, match in cases:
         with pytest.raises(ValueError, match=match):
@@ -212,7 +210,7 @@ def test_what_does_not_fit_is_refused():
 def test_they_run_on_a_simulated_gpu(flown_on_gpu):
     assert len(flown_on_gpu["disturbances"]) == 2
     for row in flown_on_gpu["disturbances"]:
-        assert row["different"] == 0
+        assert row["different"] == []
         assert row["restarts"] >= 2
         assert row["apart"]
 

@@ -135,7 +135,17 @@ def test_a_kind_that_goes_to_places_has_guidance():
 
 
 def test_it_runs_on_a_simulated_gpu(flown_on_gpu):
-    assert flown_on_gpu["actions"] == {"different": 0, "moved": True, "refused": [True, False]}
+    flown = dict(flown_on_gpu["actions"])
+    for kind in ("numbers", "choices"):
+        result = flown.pop(kind)
+        assert result["different"] == []
+        assert result["apart"]
+        assert result["restarts"] >= 2
+    # a command that cannot be flown is braked, and reported after the step
+    assert flown.pop("not flyable") == {"refused": [True, False], "moved": [True, True]}
+    assert flown.pop("half a choice") == {"refused": [False, True], "moved": [True, False]}
+    for result in flown.values():
+        assert result == {"refused": [True, False], "moved": [False, True]}
 
 
 @pytest.mark.parametrize("fault", [0, 1, 2], ids=["not finite", "no guidance", "no kind"])

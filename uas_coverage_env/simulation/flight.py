@@ -7,6 +7,7 @@ over it.
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def _write_believed_inputs(arena, state, estimated, nonlinear, i, outcome):
 
 
 @inlined_kernel
-def write_all_inputs(arena, state, nonlinear, outcome):
+def _write_all_inputs(arena, state, nonlinear, outcome):
     """What the motors of all UAS are asked for: a disturbance of one may depend on the others'."""
     estimated = as_estimated(state)
     for i in range(state.uas.shape[0]):
@@ -101,7 +102,7 @@ def clear(event):
 
 
 @inlined_kernel
-def check_all(arena, state, outcome):
+def _check_all(arena, state, outcome):
     """Refuse what is not finite, and keep the inputs within the limits."""
     for i in range(state.uas.shape[0]):
         if state.uas[i].status == FLYING:
@@ -172,19 +173,8 @@ def fly_still(arena, state, outcome):
         _note(arena, state, i, event, voltage_V, current_A)
 
 
-@kernel
-def fly_otherwise(arena, state, nonlinear, code, outcome):
-    """`fly` where it is not in still air by the linear model; arguments as there."""
-    disturbed = arena.rules[0].disturbed
-    if disturbed:
-        write_all_inputs(arena, state, nonlinear, outcome)
-        call_features(ACT, arena, state, code, outcome)
-        check_all(arena, state, outcome)
-    move_all(arena, state, nonlinear, outcome)
-
-
 @inlined_kernel
-def move_all(arena, state, nonlinear, outcome):
+def _move_all(arena, state, nonlinear, outcome):
     """Fly the inputs, and where there are any the winds and the forces, in `outcome`."""
     disturbed = arena.rules[0].disturbed
     estimated = as_estimated(state)
@@ -215,6 +205,27 @@ def move_all(arena, state, nonlinear, outcome):
         _note(arena, state, i, event, voltage_V, current_A)
 
 
+def fly_otherwise_with(call_features: Any) -> Any:
+    """`fly` where it is not in still air by the linear model; arguments as there.
+
+    Args:
+        call_features: See `points.call_features`.
+    """
+
+    @kernel
+    def fly_otherwise(arena, state, nonlinear, code, outcome):
+        if arena.rules[0].disturbed:
+            _write_all_inputs(arena, state, nonlinear, outcome)
+            call_features(ACT, arena, state, code, outcome)
+            _check_all(arena, state, outcome)
+        _move_all(arena, state, nonlinear, outcome)
+
+    return fly_otherwise
+
+
+_fly_otherwise = fly_otherwise_with(call_features)
+
+
 def feature_code(features: Sequence[MissionFeature], *, otherwise: bool = False) -> FeatureCode:
     """Compile the kernels of features, or load them from the cache.
 
@@ -234,5 +245,5 @@ def feature_code(features: Sequence[MissionFeature], *, otherwise: bool = False)
                 calls += [f, signature.address_of(feature.kernels[point])]
         code.append(FIRST + len(calls))
     otherwise = otherwise or any(feature.disturbs for feature in features)
-    fly = FLIGHT.address_of(fly_otherwise) if otherwise else 0
+    fly = FLIGHT.address_of(_fly_otherwise) if otherwise else 0
     return np.array([*code, fly, *calls], dtype=np.int64)

@@ -1,72 +1,73 @@
-"""The features of a mission on a GPU, which calls nothing at an address: one function a point."""
+"""The features of a mission on a GPU, which calls nothing at an address: they are compiled in."""
 
-from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
-from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.features.feature import MissionFeature, Point
-
-
-def called_at(point: Point, features: Sequence[MissionFeature]) -> Any:
-    """A compiled function that calls the kernels of features at a point, in their order.
-
-    Args:
-        point: Which; after BEGIN.
-        features: In the order of `Arena.features`.
-
-    Returns:
-        (arena, state, outcome) -> None.
-    """
-    return _chain(_kernels(point, features))
-
-
-def called_at_begin(features: Sequence[MissionFeature]) -> Any:
-    """Likewise where a mission begins: (arena, state, seed, mission) -> None."""
-    return _chain_at_begin(_kernels(Point.BEGIN, features))
-
-
-def _kernels(point: Point, features: Sequence[MissionFeature]) -> tuple[tuple[int, Any], ...]:
-    each = ((f, feature.kernels.get(point)) for f, feature in enumerate(features))
-    return tuple((f, own) for f, own in each if own is not None)
-
-
-@cache  # to compile it again takes seconds
-def _chain(kernels: tuple[tuple[int, Any], ...]) -> Any:
-    if not kernels:
-        return _nothing
-    (f, own), others = kernels[0], _chain(kernels[1:])
-
-    @kernel
-    def call(arena, state, outcome):
-        if arena.features[f].acts:
-            own(arena, state, outcome, f)
-        others(arena, state, outcome)
-
-    return call
-
-
-@kernel
-def _nothing(arena, state, outcome):
-    pass
+from uas_coverage_env.simulation.flight import fly, fly_otherwise_with
+from uas_coverage_env.simulation.step import advance_with
 
 
 @cache
-def _chain_at_begin(kernels: tuple[tuple[int, Any], ...]) -> Any:
+def advance_of(features: tuple[MissionFeature, ...], otherwise: bool) -> Any:
+    """`step.advance` with the kernels of features, to be called without assistants and code.
+
+    Args:
+        features: In the order of `Arena.features`.
+        otherwise: Whether the 6-DOF plant or true vehicles are flown, whatever features do.
+    """
+    kernels = tuple(
+        (int(point), f, feature.kernels[point])
+        for point in Point
+        for f, feature in enumerate(features)
+        if point != Point.BEGIN and point in feature.kernels
+    )
+    call_features = _in_turn(kernels)
+    otherwise = otherwise or any(feature.disturbs for feature in features)
+    return advance_with(call_features, fly_otherwise_with(call_features) if otherwise else fly)
+
+
+def _in_turn(kernels: tuple[tuple[int, int, Any], ...]) -> Any:
+    """`points.call_features` that calls these: their point, number of the feature, and kernel."""
     if not kernels:
-        return _nothing_begins
-    (f, own), others = kernels[0], _chain_at_begin(kernels[1:])
 
-    @kernel
-    def begin(arena, state, seed, mission):
-        if arena.features[f].acts:
-            own(arena, state, f, counted(seed, mission) ^ arena.features[f].key)
-        others(arena, state, seed, mission)
+        @inlined_kernel
+        def call_none(point, arena, state, code, outcome):
+            pass
 
-    return begin
+        return call_none
+    (at, f, own), rest = kernels[0], _in_turn(kernels[1:])
+
+    @inlined_kernel
+    def call_features(point, arena, state, code, outcome):
+        if point == at and arena.features[f].acts:
+            own(arena, state, outcome, f)
+        rest(point, arena, state, code, outcome)
+
+    return call_features
 
 
-@kernel
-def _nothing_begins(arena, state, seed, mission):
-    pass
+@cache
+def begin_features_of(features: tuple[MissionFeature, ...], first: int = 0) -> Any:
+    """`points.begin_features` with the kernels of features from one on."""
+    if first == len(features):
+
+        @inlined_kernel
+        def begin_none(arena, state, code, seed, mission):
+            pass
+
+        return begin_none
+    rest = begin_features_of(features, first + 1)
+    own = features[first].kernels.get(Point.BEGIN)
+    if own is None:
+        return rest
+
+    @inlined_kernel
+    def begin_features(arena, state, code, seed, mission):
+        if arena.features[first].acts:
+            own(arena, state, first, counted(seed, mission) ^ arena.features[first].key)
+        rest(arena, state, code, seed, mission)
+
+    return begin_features

@@ -1,6 +1,7 @@
 """One step of the world: the rules of the game."""
 
 import math
+from typing import Any
 
 from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
@@ -116,32 +117,44 @@ def judge(arena, state, nonlinear, outcome):
     state.step[0] += 1
 
 
-@kernel
-def advance(arena, state, commands, nonlinear, assistants, code, outcome):
-    """Fly all UAS for one step and judge what happened by the rules of `docs/rules.md`.
-
-    All decide from the state at sample k; then all fly; then contacts are judged on the straight
-    segments between the samples, and breaches, coverage and landing at sample k+1.
+def advance_with(call_features: Any, fly: Any) -> Any:
+    """A step of the world, made of these functions.
 
     Args:
-        arena: The arena.
-        state: The state; written in place.
-        commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
-        nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
-        assistants: What helps to fly, see `assistants`. Commands of kind GO_TO need guidance.
-        code: `FeatureCode` of what is in the arena; None: see `fly`.
-        outcome: (U,) of OUTCOME_DTYPE; written.
+        call_features: See `points.call_features`.
+        fly: See `flight.fly`.
     """
-    begin_step(state, commands, outcome)
-    call_features(COMMAND, arena, state, code, outcome)
-    measured = as_measured(state)
-    for k in range(len(assistants)):
-        assist(assistants[k], arena, measured, nonlinear, outcome)
-    fly(arena, state, nonlinear, code, outcome)
-    call_features(MOVED, arena, state, code, outcome)
-    judge(arena, state, nonlinear, outcome)
-    call_features(JUDGED, arena, state, code, outcome)
-    call_features(SENSED, arena, state, code, outcome)
+
+    @kernel
+    def advance(arena, state, commands, nonlinear, assistants, code, outcome):
+        """Fly all UAS for one step and judge what happened by the rules of `docs/rules.md`.
+
+        Args:
+            arena: The arena.
+            state: The state; written in place.
+            commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
+            nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
+            assistants: What helps to fly, see `assistants`; None: nothing does. Commands of kind
+                GO_TO need guidance.
+            code: `FeatureCode` of what is in the arena; None: see `fly`.
+            outcome: (U,) of OUTCOME_DTYPE; written.
+        """
+        begin_step(state, commands, outcome)
+        call_features(COMMAND, arena, state, code, outcome)
+        if assistants is not None:
+            measured = as_measured(state)
+            for k in range(len(assistants)):
+                assist(assistants[k], arena, measured, nonlinear, outcome)
+        fly(arena, state, nonlinear, code, outcome)
+        call_features(MOVED, arena, state, code, outcome)
+        judge(arena, state, nonlinear, outcome)
+        call_features(JUDGED, arena, state, code, outcome)
+        call_features(SENSED, arena, state, code, outcome)
+
+    return advance
+
+
+advance = advance_with(call_features, fly)
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
@@ -31,6 +31,9 @@ from uas_coverage_env.env.report import FILTERED, STATUS
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.world import Command
+
+if TYPE_CHECKING:
+    from uas_coverage_env.env.gpu.missions import CudaMissions
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next_step",
@@ -409,6 +412,30 @@ class CoverageVectorEnv(Versioned, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
             self.render()
 
 
+@overload
+def vector_env(
+    num_envs: int = 1,
+    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
+    *,
+    device: Literal["cuda"],
+    **settings: Unpack[MissionKeywords],
+) -> "CudaMissions": ...
+
+
+@overload
+def vector_env(
+    num_envs: int = 1,
+    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
+    *,
+    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    threads: int = 1,
+    copy: bool = True,
+    render_mode: str | None = None,
+    device: Literal["cpu"] = "cpu",
+    **settings: Unpack[MissionKeywords],
+) -> CoverageVectorEnv: ...
+
+
 @takes_settings
 def vector_env(
     num_envs: int = 1,
@@ -418,8 +445,9 @@ def vector_env(
     threads: int = 1,
     copy: bool = True,
     render_mode: str | None = None,
+    device: Literal["cpu", "cuda"] = "cpu",
     **settings: Unpack[MissionKeywords],
-) -> CoverageVectorEnv:
+) -> "CoverageVectorEnv | CudaMissions":
     """Many missions at once; the same as `gymnasium.make_vec("UASCoverage-v0", num_envs)`.
 
     Args:
@@ -429,6 +457,8 @@ def vector_env(
         threads: How many of numba's threads share the missions.
         copy: Whether observations are arrays of their own.
         render_mode: None, "rgb_array", "rgb_array_tiled" or "human".
+        device: "cpu"; or "cuda": on a GPU (extra `gpu`), see `CudaMissions`, whose arrays stay
+            there and are always overwritten.
         action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
@@ -451,13 +481,16 @@ def vector_env(
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
+        ImportError: "cuda", and numba-cuda is not installed.
+        RuntimeError: "cuda", and there is no GPU.
     """
-    return CoverageVectorEnv(
-        num_envs,
-        scenario,
-        autoreset_mode=autoreset_mode,
-        threads=threads,
-        copy=copy,
-        render_mode=render_mode,
-        **settings,
-    )
+    both: dict[str, Any] = {
+        "autoreset_mode": autoreset_mode, "threads": threads, "render_mode": render_mode, **settings
+    }  # fmt: skip
+    if device == "cuda":
+        from uas_coverage_env.env.gpu.missions import CudaMissions
+
+        return CudaMissions(num_envs, scenario, **both)
+    if device != "cpu":
+        raise ValueError(f"device is {device!r}; it is one of cpu, cuda")
+    return CoverageVectorEnv(num_envs, scenario, copy=copy, **both)

@@ -14,7 +14,7 @@ from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.actions.given import accept_of_lanes
-from uas_coverage_env.env.batch.checkpoint import checked
+from uas_coverage_env.env.batch.checkpoint import changing, checked
 from uas_coverage_env.env.batch.drawn import pool_of
 from uas_coverage_env.env.batch.kernel import (
     BatchRules,
@@ -196,27 +196,10 @@ class CoverageBatch:
         Raises:
             ValueError: A seed is negative or too large, or their number is wrong.
         """
-        if isinstance(seed, int | np.integer):
-            seeds: list[int | None] = [int(seed) + lane for lane in range(self.num_envs)]
-        elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
-            seeds = list(seed)
-        else:
-            raise ValueError(f"seed is {seed!r}; give a whole number, or one for each environment")
-        if len(seeds) != self.num_envs:
-            raise ValueError(
-                f"{len(seeds)} seeds for {self.num_envs} environments; give one for each"
-            )
-        for lane, value in enumerate(seeds):
-            if value is None:
-                continue
-            whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-            if not whole or not 0 <= value < SEEDS:
-                raise ValueError(
-                    f"seed of environment {lane} is {value!r}; give a whole number from 0 to "
-                    f"2**64 - 1"
-                )
-            self.lanes.seed[lane] = value
-            self.lanes.mission[lane] = -1
+        for lane, value in enumerate(seeds_of(seed, self.num_envs)):
+            if value is not None:
+                self.lanes.seed[lane] = value
+                self.lanes.mission[lane] = -1
 
     def reset(
         self,
@@ -332,13 +315,7 @@ class CoverageBatch:
         self._begun = bool((self.lanes.mission >= 0).all())
 
     def _changing(self) -> dict[str, NDArray[Any]]:
-        parts = (self.worlds, self.learners, self.lanes)
-        arrays = {k: v for part in parts for k, v in part._asdict().items()}
-        del arrays["scene"]  # it follows from the others
-        if not self.pool.changes:
-            del arrays["changes"]
-        arrays["observation"] = self.observation
-        return {**arrays, **self.pool.kept()}
+        return changing(self.pool, self.missions, self.observation)
 
     def swarm_state(self, lane: int) -> SwarmState:
         """What a planner of this lane sees now, in arrays of their own."""
@@ -460,6 +437,29 @@ class CoverageBatch:
         begins_later = self._begins_here and self.autoreset == SAME_STEP
         autoreset = DISABLED if begins_later else self.autoreset
         return BatchRules(rules, autoreset, lane_code(version, settings.observation_size))
+
+
+def seeds_of(seed: Any, num_envs: int) -> list[int | None]:
+    """The seed of each environment, see `CoverageBatch.seed`.
+
+    Raises:
+        ValueError: A seed is negative or too large, or their number is wrong.
+    """
+    if isinstance(seed, int | np.integer):
+        seeds: list[int | None] = [int(seed) + lane for lane in range(num_envs)]
+    elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
+        seeds = list(seed)
+    else:
+        raise ValueError(f"seed is {seed!r}; give a whole number, or one for each environment")
+    if len(seeds) != num_envs:
+        raise ValueError(f"{len(seeds)} seeds for {num_envs} environments; give one for each")
+    for lane, value in enumerate(seeds):
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if value is not None and (not whole or not 0 <= value < SEEDS):
+            raise ValueError(
+                f"seed of environment {lane} is {value!r}; give a whole number from 0 to 2**64 - 1"
+            )
+    return seeds
 
 
 def _check_count(name: str, count: Any, most: int) -> None:

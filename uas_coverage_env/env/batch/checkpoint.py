@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.batch.memory import LANES
+from uas_coverage_env.env.batch.memory import LANES, Missions
 from uas_coverage_env.env.batch.scenes import scenes_in
 from uas_coverage_env.env.batch.source import DrawnMission, LaneMissions
 from uas_coverage_env.env.batch.state_dict import check_values
@@ -15,6 +15,25 @@ from uas_coverage_env.env.episode.memory import LEARNERS
 from uas_coverage_env.features.feature import fitted_to, memory_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle.record import COUNTS
+
+
+def changing(pool: LaneMissions, missions: Missions, observation: Any) -> dict[str, Any]:
+    """The arrays that change from step to step, by name.
+
+    Args:
+        pool: Of the batch.
+        missions: Likewise, in any memory.
+        observation: (L, U, V) likewise, the latest.
+
+    Raises:
+        ValueError: See `LaneMissions.kept`.
+    """
+    parts = (missions.worlds, missions.learners, missions.lanes)
+    arrays = {name: array for part in parts for name, array in part._asdict().items()}
+    del arrays["scene"]  # it follows from the others
+    if not pool.changes:
+        del arrays["changes"]
+    return {**arrays, "observation": observation, **pool.kept()}
 
 
 def checked(

@@ -63,7 +63,8 @@ from uas_coverage_env.simulation.pool import arena_of, start_of, state_of
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import begin_events
 
-_scratch_of = lane_view(SCRATCH, sized_by=ARENA)
+scratch_of = lane_view(SCRATCH, sized_by=ARENA)
+"""In a kernel, (`Missions.scratch`, thread, `MissionPool.arenas`, s) -> what it flies a lane in."""
 
 
 @kernel
@@ -88,48 +89,58 @@ def _copy(source, target):
             target[i, k] = source[i, k]
 
 
-@rare_kernel
-def _begin_lane(pool, missions, code, lane, order, observation, width):
-    """Begin a mission in a lane, as `Episode.reset` does for a single one."""
-    lanes = missions.lanes
-    s = order
-    if order == DRAW:
-        s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.starts.sizes.shape[0])
-    lanes.scenario[lane] = s
-    lanes.scene[lane] = s
-    for k in range(lanes.changes.shape[1]):
-        lanes.changes[lane, k] = -1
-    lanes.mission[lane] += 1
-    lanes.orders[lane] = FLY
-    state = state_of(missions.worlds, lane, pool.arenas, s)
-    copy_arrays(start_of(pool.starts, s), state)
-    arena = arena_of(pool.arenas, s)
-    begin_events(arena, state, lanes.seed[lane], lanes.mission[lane])
-    begin_features(arena, state, code, lanes.seed[lane], lanes.mission[lane])
-    first = first_learners_at(pool.learners, s)
-    copy_arrays(first, learners_of(missions.learners, lane, pool.arenas, s))
-    n_uas = first.report.shape[0]
-    n_covered = first.report[0, COVERED]
-    seen = first_observation_at(pool.first_observations, s).observation
-    _copy(seen, rows_view(observation, lane, seen.shape))
-    report = missions.learners.report
-    for i in range(n_uas, report.shape[1]):
-        missions.worlds.uas[lane, i].status = ABSENT
-        missions.learners.targets[lane, i] = NO_TARGET
-        for k in range(K_WAYPOINTS):
-            missions.learners.candidates[lane, i, k] = -1
-        for k in range(width):
-            observation[lane, i, k] = 0.0
-        for column in range(REPORT_SIZE):
-            report[lane, i, column] = 0
-        report[lane, i, CONTACT_WITH] = -1
-        report[lane, i, STATUS] = ABSENT
-        report[lane, i, COVERED] = n_covered
-    for i in range(report.shape[1]):
-        missions.settled[lane, i] = False
-    for column in range(lanes.swarm.shape[1]):
-        lanes.swarm[lane, column] = 0.0
-    lanes.swarm[lane, SWARM_COVERED] = n_covered
+@cache
+def begin_lane_with(begin_features: Any) -> Any:
+    """A kernel that begins a mission in a lane.
+
+    Args:
+        begin_features: See `simulation.points.begin_features`.
+    """
+
+    @rare_kernel
+    def begin_lane(pool, missions, code, lane, order, observation, width):
+        """Begin a mission in a lane, as `Episode.reset` does for a single one."""
+        lanes = missions.lanes
+        s = order
+        if order == DRAW:
+            s = drawn(lanes.seed[lane], lanes.mission[lane] + 1, pool.starts.sizes.shape[0])
+        lanes.scenario[lane] = s
+        lanes.scene[lane] = s
+        for k in range(lanes.changes.shape[1]):
+            lanes.changes[lane, k] = -1
+        lanes.mission[lane] += 1
+        lanes.orders[lane] = FLY
+        state = state_of(missions.worlds, lane, pool.arenas, s)
+        copy_arrays(start_of(pool.starts, s), state)
+        arena = arena_of(pool.arenas, s)
+        begin_events(arena, state, lanes.seed[lane], lanes.mission[lane])
+        begin_features(arena, state, code, lanes.seed[lane], lanes.mission[lane])
+        first = first_learners_at(pool.learners, s)
+        copy_arrays(first, learners_of(missions.learners, lane, pool.arenas, s))
+        n_uas = first.report.shape[0]
+        n_covered = first.report[0, COVERED]
+        seen = first_observation_at(pool.first_observations, s).observation
+        _copy(seen, rows_view(observation, lane, seen.shape))
+        report = missions.learners.report
+        for i in range(n_uas, report.shape[1]):
+            missions.worlds.uas[lane, i].status = ABSENT
+            missions.learners.targets[lane, i] = NO_TARGET
+            for k in range(K_WAYPOINTS):
+                missions.learners.candidates[lane, i, k] = -1
+            for k in range(width):
+                observation[lane, i, k] = 0.0
+            for column in range(REPORT_SIZE):
+                report[lane, i, column] = 0
+            report[lane, i, CONTACT_WITH] = -1
+            report[lane, i, STATUS] = ABSENT
+            report[lane, i, COVERED] = n_covered
+        for i in range(report.shape[1]):
+            missions.settled[lane, i] = False
+        for column in range(lanes.swarm.shape[1]):
+            lanes.swarm[lane, column] = 0.0
+        lanes.swarm[lane, SWARM_COVERED] = n_covered
+
+    return begin_lane
 
 
 @inlined_kernel
@@ -275,20 +286,24 @@ _keep, _take = _HANDOVER.keep, _HANDOVER.take
 
 
 @cache
-def step_lane_with(version: Version) -> Any:
-    """One lane of `step_batch`.
+def fly_lane_with(step_learners: Any, begin_features: Any, *, fetches: bool) -> Any:
+    """What one lane does in a step, made of these functions.
+
+    Args:
+        step_learners: See `step_learners_of`.
+        begin_features: See `simulation.points.begin_features`.
+        fetches: Whether memory is fetched ahead, for which a GPU has no instruction.
 
     Returns:
-        `step_lane(kept, lane, order, thread, autoreset, before, observation, width)`: `kept` is
-        `_Given`, handed over; `order` what the lane does; `thread` which thread flies it, from 0
-        on; `width` is V: to know it when this is compiled makes a step a tenth faster. The rest is
-        as for `step_batch`.
+        `fly_lane(pool, missions, rules, lane, order, thread, autoreset, before, observation,
+        width)`: `order` is what the lane does; `thread` which thread flies it, from 0 on; `width`
+        is V: to know it when this is compiled makes a step a tenth faster. The rest is as for
+        `step_batch`.
     """
-    step_learners = step_learners_with(version)
+    begin_lane = begin_lane_with(begin_features)
 
-    @kernel
-    def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
-        pool, missions, rules = _take(kept)
+    @inlined_kernel
+    def fly_lane(pool, missions, rules, lane, order, thread, autoreset, before, observation, width):
         lanes = missions.lanes
         if rarely(order == REST):
             whole = (observation.shape[1], width)
@@ -310,13 +325,14 @@ def step_lane_with(version: Version) -> Any:
             learners = learners_of(missions.learners, lane, pool.arenas, s)
             n_uas = state.uas.shape[0]
             rows = rows_view(observation, lane, (n_uas, width))
-            _fetch_ahead(state, learners, rows)
+            if fetches:
+                _fetch_ahead(state, learners, rows)
             _keep_last_looks(
                 missions.worlds, missions.settled, lane, n_uas, before, observation, width
             )
             step_learners(
                 arena, state, tables_at(pool.tables, s), learners,
-                _scratch_of(missions.scratch, thread, pool.arenas, s), rules, False, rows,
+                scratch_of(missions.scratch, thread, pool.arenas, s), rules, False, rows,
             )  # fmt: skip
             over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
             if over and autoreset == NEXT_STEP:
@@ -328,7 +344,25 @@ def step_lane_with(version: Version) -> Any:
                 begins = True
                 order = DRAW
         if rarely(begins):
-            _begin_lane(pool, missions, rules.code, lane, order, observation, width)
+            begin_lane(pool, missions, rules.code, lane, order, observation, width)
+
+    return fly_lane
+
+
+@cache
+def step_lane_with(version: Version) -> Any:
+    """One lane of `step_batch`.
+
+    Returns:
+        `step_lane(kept, lane, order, thread, autoreset, before, observation, width)`: `kept` is
+        `_Given`, handed over; the rest is as for `fly_lane_with`.
+    """
+    fly_lane = fly_lane_with(step_learners_with(version), begin_features, fetches=True)
+
+    @kernel
+    def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
+        pool, missions, rules = _take(kept)
+        fly_lane(pool, missions, rules, lane, order, thread, autoreset, before, observation, width)
 
     return step_lane
 

@@ -29,7 +29,7 @@ CALL_DTYPE = record_dtype(
         ("address", "i8"),
         # first number that it writes, and how many
         ("column", "i8"),
-        ("size", "i8"),
+        ("width", "i8"),
         # first parameter that it is handed, and how many
         ("first", "i8"),
         ("parameters", "i8"),

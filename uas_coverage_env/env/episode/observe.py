@@ -141,7 +141,7 @@ def observe_one_with(own: Blocks, *, calls: bool = True) -> Any:
                 _write_block(
                     call.address, arena, state, tables, learners, i,
                     slice_view(observing.parameters, call.first, call.parameters),
-                    slice_view(row, call.column, call.size),
+                    slice_view(row, call.column, call.width),
                 )  # fmt: skip
 
     return observe_one

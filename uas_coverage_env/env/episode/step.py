@@ -36,9 +36,9 @@ class Rules(NamedTuple):
     nonlinear: bool
     """Whether the 6-DOF plant is flown."""
     assistants: Any
-    """Which help to fly, see `autopilot.assist`."""
+    """Which help to fly, see `autopilot.assist`; None on a GPU."""
     code: Any
-    """What features do, see `simulation.points.FeatureCode`."""
+    """What features do, see `simulation.points.FeatureCode`; None on a GPU."""
     paying: Paying
     observing: Observing
 
@@ -112,8 +112,16 @@ def look_around_with(observe_one: Any) -> Any:
 
 
 @cache
-def step_learners_with(version: Version) -> Any:
-    """The step of one mission.
+def step_learners_of(
+    write_commands: Any, advance: Any, compute_rewards: Any, observe_one: Any
+) -> Any:
+    """The step of one mission, made of these functions.
+
+    Args:
+        write_commands: See `act.write_commands_with`.
+        advance: See `simulation.advance`.
+        compute_rewards: See `pay.compute_rewards_with`.
+        observe_one: See `observe.observe_one_with`.
 
     Returns:
         `step_learners(arena, state, tables, learners, scratch, rules, new_scene, observation)`:
@@ -121,9 +129,8 @@ def step_learners_with(version: Version) -> Any:
         observes. All actions are finite; the row in `observation` (U, V) of a UAS that did not fly
         stays.
     """
-    write_commands = write_commands_with(version.actions)
-    pay_step = pay_step_with(compute_rewards_with(version.reward))
-    look_around = look_around_with(observe_one_with(version.observation))
+    pay_step = pay_step_with(compute_rewards)
+    look_around = look_around_with(observe_one)
 
     @inlined_kernel
     def step_learners(arena, state, tables, learners, scratch, rules, new_scene, observation):
@@ -140,6 +147,16 @@ def step_learners_with(version: Version) -> Any:
         )
 
     return step_learners
+
+
+def step_learners_with(version: Version) -> Any:
+    """`step_learners_of` what is in a version; other blocks, terms and kinds are called."""
+    return step_learners_of(
+        write_commands_with(version.actions),
+        advance,
+        compute_rewards_with(version.reward),
+        observe_one_with(version.observation),
+    )
 
 
 _views = EPISODE.views

@@ -1,0 +1,99 @@
+"""What does not run on a GPU: one table, of which its errors and its page in the docs are made."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from gymnasium.vector import AutoresetMode
+
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.world.events import goes_home
+
+_OWN_MODE = (AutoresetMode.NEXT_STEP, AutoresetMode.NEXT_STEP.value)
+
+
+class Given(NamedTuple):
+    """What missions on a GPU are asked for."""
+
+    scenario: Any
+    """A `Scenario`, or what draws them."""
+    settings: MissionSettings
+    flat_infos: bool | None
+    autoreset_mode: str | AutoresetMode
+    threads: int
+    render_mode: str | None
+
+
+class Refusal(NamedTuple):
+    """A thing that does not run there."""
+
+    what: str
+    instead: str
+    is_asked_for: Callable[[Given], bool]
+
+
+REFUSED = (
+    Refusal(
+        '`action="waypoint"`, or another kind that goes to places',
+        "take an action that flies: velocity, acceleration, wrench, or a kind of your own",
+        lambda given: given.settings.kind.goes_to,
+    ),
+    Refusal("`return_mode`", "leave it out", lambda given: given.settings.return_mode),
+    Refusal("`safety_filter`", "leave it out", lambda given: given.settings.safety_filter),
+    Refusal(
+        "missions that are drawn: a family, a sequence, a generator",
+        "give one scenario, such as `generate_scenario(seed=1)`",
+        lambda given: not isinstance(given.scenario, Scenario),
+    ),
+    Refusal(
+        'an event that sends UAS home (`then = "return"`)',
+        'let them do another thing (`then = "hover"`)',
+        lambda given: goes_home(given.scenario),
+    ),
+    Refusal(
+        "`autoreset_mode` other than `NextStep`",
+        "leave it out: a mission that has ended begins anew in the next step",
+        lambda given: given.autoreset_mode not in _OWN_MODE,
+    ),
+    Refusal(
+        "`mask_in_observation`",
+        "leave it out: the mask of your kind of action takes `missions.learners.candidates`",
+        lambda given: given.settings.mask_in_observation,
+    ),
+    Refusal(
+        "`images_apart`",
+        "leave it out: pictures are columns of the observation",
+        lambda given: given.settings.images_apart,
+    ),
+    Refusal(
+        "`flat_infos`",
+        "leave it out: there are no infos, `report` has what they say",
+        lambda given: given.flat_infos is not None,
+    ),
+    Refusal(
+        "`render_mode`",
+        "leave it out, and watch single missions of `parallel_env`",
+        lambda given: given.render_mode is not None,
+    ),
+    Refusal(
+        "`threads` other than 1",
+        "leave it out: every mission has a thread of the GPU",
+        lambda given: given.threads != 1,
+    ),
+)
+"""In the order in which they are looked for."""
+
+
+def refuse(given: Given) -> None:
+    """Refuse what does not run on a GPU.
+
+    Raises:
+        ValueError: There is such a thing; says what, and what to do instead.
+    """
+    for refusal in REFUSED:
+        if refusal.is_asked_for(given):
+            raise ValueError(
+                f'not on a GPU: {refusal.what}; {refusal.instead}, or take device="cpu"'.replace(
+                    "`", ""
+                )
+            )
