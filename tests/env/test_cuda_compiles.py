@@ -10,9 +10,8 @@ from numba import typeof, types
 from own_actions import CLIMB_RATE
 from own_blocks import SLOW, beacon
 
-from uas_coverage_env.env import REWARD, grid
+from uas_coverage_env.env import REWARD, grid, local
 from uas_coverage_env.env.gpu import missions as missions_on_gpu
-from uas_coverage_env.env.observation.named import OBSERVATIONS
 
 COMPUTE_CAPABILITY = (8, 0)
 
@@ -39,7 +38,7 @@ OWN = {
     "as_usual": {},
     "with_own_disturbances": {"disturbances": own_disturbances_on_gpu.OWN, "action": CLIMB_RATE},
     "with_own_blocks": {
-        "observation": (*OBSERVATIONS["local"], grid(4), beacon(0.0, 0.0)),
+        "observation": (*local(), grid(4), beacon(0.0, 0.0)),
         "reward": (*REWARD, SLOW),
     },
 }
