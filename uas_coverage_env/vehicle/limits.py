@@ -70,7 +70,7 @@ LOST_BEYOND = 1.5
 the models are not made for such states, which no inner loop leads back from."""
 
 
-def bounds_of(vehicle: VehicleParams) -> NDArray[np.float64]:
+def limit_bounds(vehicle: VehicleParams) -> NDArray[np.float64]:
     """(N_LIMITS,) the bound of each limit, in its unit."""
     limits, battery = vehicle.limits, vehicle.battery
     return np.array(

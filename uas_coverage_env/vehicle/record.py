@@ -13,7 +13,7 @@ from uas_coverage_env.vehicle.governor import (
     design_velocity_loop,
     horizontal_axis,
 )
-from uas_coverage_env.vehicle.limits import N_LIMITS, bounds_of
+from uas_coverage_env.vehicle.limits import N_LIMITS, limit_bounds
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.params import VehicleParams
 from uas_coverage_env.vehicle.true_vehicle import N_PERTURBATIONS
@@ -126,7 +126,7 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
     record["fitted_trim_rad_per_mps"] = vehicle.trim_tilt_rad_per_mps
     record["thrust_factor"] = record["power_factor"] = 1.0
     record["torque_max_Nm"] = vehicle.torque_max_Nm
-    record["bounds"] = bounds_of(vehicle)
+    record["bounds"] = limit_bounds(vehicle)
     gain, rows, record["reference_max_mps"] = design_velocity_loop(vehicle, float(dt_s))
     if len(rows) > MAX_GOVERNOR_ROWS:
         raise ValueError(f"dt_s is {dt_s}; too short for the limits of {vehicle.name!r}")

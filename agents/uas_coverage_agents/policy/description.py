@@ -144,7 +144,7 @@ class Interval(StrictModel):
     high: float
 
 
-class Score(StrictModel):
+class PolicyScore(StrictModel):
     """How it flew scenarios that it was not trained on.
 
     Attributes:
@@ -181,7 +181,7 @@ class PolicyDescription(StrictModel):
     observation: Observation
     scenarios: ScenarioFamily
     training: Training
-    score: Score | None = None
+    score: PolicyScore | None = None
     versions: dict[Name, str]
     weights_sha256: Annotated[str, Field(pattern="^([0-9a-f]{64})?$")] = ""
 
