@@ -3,6 +3,7 @@
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import pettingzoo
@@ -47,9 +48,9 @@ def _register_gymnasium(name: str, module: str, **kwargs: str) -> None:
 
 
 def _register_pettingzoo(kind: str, name: str, entry_point: str, **kwargs: str) -> None:
-    registry = getattr(pettingzoo, f"{kind}_registry", None)
-    if registry is not None and name not in registry:
-        pettingzoo.register(kind, name, entry_point, kwargs=kwargs)
+    library: Any = pettingzoo
+    if hasattr(library, "register") and name not in getattr(library, f"{kind}_registry"):
+        library.register(kind, name, entry_point, kwargs=kwargs)
 
 
 @cache

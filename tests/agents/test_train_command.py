@@ -28,6 +28,7 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import evaluate
 from uas_coverage_env.leaderboard import Row
+from uas_coverage_env.runner.jobs import WorkerLostError, Workers
 from uas_coverage_env.runner.store import opened, rows_in
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
@@ -115,6 +116,17 @@ def test_a_baseline_that_is_no_planner_is_refused_before_anything_is_begun(tmp_p
     out = ["--out", str(tmp_path / "run")]
     assert "unknown planner" in refusal(capsys, TINY, *out, "--baselines", "nearest-waypiont")
     assert not (tmp_path / "run").exists()
+
+
+def test_a_flight_that_kills_every_process_ends_a_training_in_a_line(tmp_path, monkeypatch, capsys):
+    def lost(self, jobs):
+        raise WorkerLostError("town policy 0: its process ended (by SIGKILL), 3 times")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Workers, "run", lost)
+        assert train(tmp_path / "run", "--steps", "64") == 1
+    assert "3 times; the same command goes on" in capsys.readouterr().err
+    assert train(tmp_path / "run", "--steps", "64") == 0
 
 
 @pytest.mark.usefixtures("curve_without_picture")

@@ -52,5 +52,5 @@ def test_what_was_changed_by_hand_is_made_anew_and_the_rest_is_left(tables):
     ],
 )
 def test_a_mark_without_a_part_or_an_end_is_named(tables, page):
-    with pytest.raises(ValueError, match="has no end, or is none of environments"):
+    with pytest.raises(ValueError, match="has no end, or is none of "):
         tables.renewed(page)

@@ -236,7 +236,7 @@ def test_what_is_no_disturbance_is_refused():
     again = waypoint((150.0, 150.0, -20.0)) | {"again_after_s": (30.0,)}
     cases = [
         (lambda: World(meadow(), disturbances=push(0.0, 0.0, 0.0)), "give a tuple"),
-        (lambda: World(meadow(), disturbances=("wind",)), "no Feature"),
+        (lambda: World(meadow(), disturbances=("wind",)), "no MissionFeature"),
         (lambda: World(meadow(), disturbances=(gusts(), gusts())), "a name of its own"),
         (lambda: push(math.inf, 0.0, 0.0), r"push: parameters\[0\] is inf"),
         (lambda: Disturbance("", None), "give it a name"),

@@ -58,7 +58,7 @@ from typing import ClassVar, Literal
 from uas_coverage_env.compiled.kernels import rare_kernel
 from uas_coverage_env.features.event import OfUas, concerns, lasts
 from uas_coverage_env.features.feature import MissionFeature, Point
-from uas_coverage_env.vehicle import LIFT
+from uas_coverage_env.vehicle.layout import LIFT
 
 
 @rare_kernel

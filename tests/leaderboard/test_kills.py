@@ -51,10 +51,13 @@ def nursery() -> Iterator[subprocess.Popen]:
 
 def started(nursery: subprocess.Popen, scenarios: str, out: Path, jobs: int) -> int:
     """Begin a sweep; returns its process."""
-    nursery.stdin.write(
-        f"compare --scenarios '{scenarios}' --planners {PLANNERS} --seeds 0:{SEEDS} "
-        f"--jobs {jobs} --out '{out}'\n"
-    )
+    command = f"compare --scenarios '{scenarios}' --planners {PLANNERS} --seeds 0:{SEEDS}"
+    return begun(nursery, command, out, jobs)
+
+
+def begun(nursery: subprocess.Popen, command: str, out: Path, jobs: int) -> int:
+    """Begin a command; returns its process."""
+    nursery.stdin.write(f"{command} --jobs {jobs} --out '{out}'\n")
     nursery.stdin.flush()
     return int(nursery.stdout.readline())
 
@@ -76,6 +79,18 @@ def count(out: Path) -> int:
 def children(process: int) -> set[int]:
     """The processes that a process has begun; none where there is no /proc."""
     return {int(path.parent.name) for path in _stats() if _stat(path)[1:2] == [str(process)]}
+
+
+def workers(process: int) -> set[int]:
+    """Those of them that fly."""
+    found = set()
+    for child in children(process):
+        try:
+            if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                found.add(child)
+        except OSError:
+            pass
+    return found
 
 
 def alive(processes: set[int]) -> set[int]:
@@ -134,3 +149,32 @@ def test_five_kills_at_random_moments_change_nothing(nursery, two_yards, tmp_pat
     assert flights_in(killed) == flights_in(tmp_path / "calm")
     with closing(sqlite3.connect(killed / STORE)) as store:
         assert store.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="/proc is of Linux")
+@pytest.mark.parametrize(
+    ("command", "total"),
+    [
+        ("compare --scenarios {yards} --planners hover,random-walk --seeds 0:8 --no-bounds", 32),
+        ("score --level hard --planners hover,nearest-waypoint --missions 6", 12),
+        ("demonstrate generated:900000:900008 --planner nearest-waypoint", 8),
+    ],
+)
+def test_a_worker_that_is_killed_costs_no_flight_of_any_command(
+    nursery, two_yards, tmp_path, command, total
+):
+    asked = command.format(yards=f"'{two_yards}'")
+    killed = tmp_path / "killed"
+    owner = begun(nursery, asked, killed, jobs=2)
+    assert soon(lambda: count(killed) >= 1)
+    os.kill(workers(owner).pop(), signal.SIGKILL)
+    assert count(killed) < total, "it was over before"
+    assert ended(nursery) == 0
+    assert count(killed) == total
+    begun(nursery, asked, tmp_path / "calm", jobs=1)
+    assert ended(nursery) == 0
+    assert flights_in(killed) == flights_in(tmp_path / "calm")
+    shown = sorted(path.name for path in killed.glob("*.npz"))
+    assert shown == sorted(path.name for path in (tmp_path / "calm").glob("*.npz"))
+    for name in shown:
+        assert (killed / name).read_bytes() == (tmp_path / "calm" / name).read_bytes()

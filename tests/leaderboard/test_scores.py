@@ -288,4 +288,5 @@ def test_a_figure_is_summed_up_over_flights_as_it_says(figure, value, cell):
     rows = [[Flown(1.0), Flown(3.0)]]
     found = column.of(Flights(rows, rows, "seeds", "seeds", {}))
     assert getattr(found, "value", found) == value
+    assert type(getattr(found, "value", found)) is type(value)
     assert column.cell(Scores("p", {column.name: found, "flights": 2})) == cell

@@ -10,9 +10,7 @@ from uas_coverage_env.draw.colours import (
     BLUE,
     INK,
     PAGES,
-    WHITE,
     hex_of,
-    on_dark_area,
     on_dark_line,
     page_style,
 )
@@ -47,11 +45,10 @@ def test_pages_are_given_all_colours_light_and_dark():
             assert f"--{name}:{hex_of(colour)};" in style
 
 
-def test_on_dark_pages_lines_are_lighter_and_areas_darker_as_in_the_viewer():
-    """As `bright` and `dim` of viewer/src/palette.ts."""
+def test_on_dark_pages_lines_are_lighter_as_in_the_viewer():
+    """As `bright` of viewer/src/palette.ts."""
     assert hex_of(on_dark_line(BLUE)) == "#4d9cc9"
     assert hex_of(on_dark_line(INK)) == "#b3b4b5"
-    assert hex_of(on_dark_area(WHITE)) == "#b3b3b3"
 
 
 def test_the_bundle_carries_the_licence_of_three():

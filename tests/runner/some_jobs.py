@@ -18,6 +18,11 @@ def pid_after(seconds: float) -> int:
     return os.getpid()
 
 
+def held() -> bool:
+    """Whether Ctrl-C is held back from its process since it began."""
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, set())
+
+
 def raises(what: str) -> None:
     """One that goes wrong."""
     raise ZeroDivisionError(what)

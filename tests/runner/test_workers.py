@@ -127,6 +127,12 @@ def test_what_is_under_way_ends_where_nobody_wants_the_rest(pair, tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="POSIX")
+def test_ctrl_c_is_for_the_owner_alone_from_the_start_of_a_process_on(pair):
+    assert run(pair, Job("a", some_jobs.held)) == {"a": True}
+    assert not some_jobs.held()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_the_processes_end_with_their_owner(tmp_path, number):
     code = f"import sys; sys.path.insert(0, {str(HERE)!r})\n"

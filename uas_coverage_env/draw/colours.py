@@ -103,11 +103,6 @@ def on_dark_line(colour: Colour) -> Colour:
     return mixed(colour, 255, 0.65 if sum(colour) < 200 else 0.3)
 
 
-def on_dark_area(colour: Colour) -> Colour:
-    """That of a large area on a dark ground: darker (`dim` of the viewer's palette.ts)."""
-    return mixed(colour, 0, 0.3)
-
-
 def hex_of(colour: Colour) -> str:
     """As pages write it: #rrggbb."""
     return "#" + "".join(f"{part:02x}" for part in colour)
@@ -153,15 +148,10 @@ PAGES: dict[str, tuple[Colour, Colour]] = {
         near_fence=(127, 127, 127),
         near_height=(184, 134, 11),
     ),
-    **{
-        name: (tint, on_dark_area(tint))
-        for name, tint in (
-            ("obstacle", OTHER_OBSTACLE),
-            ("no-fly", OBSTACLES["no_fly"]),
-            ("street", DECORATIONS["street"]),
-            ("search", OTHER_DECORATION),
-        )
-    },
+    "obstacle": (OTHER_OBSTACLE, (93, 95, 95)),
+    "no-fly": (OBSTACLES["no_fly"], (125, 68, 64)),
+    "street": (DECORATIONS["street"], (52, 58, 59)),
+    "search": (OTHER_DECORATION, (53, 50, 36)),
     **{f"uas-{n}": (colour, on_dark_line(colour)) for n, colour in enumerate(UAS)},
 }
 """Custom properties of pages -> their colour on light and on dark ones."""

@@ -19,7 +19,7 @@ Kept = Literal["row", "flight", "demonstration"]
 """What is kept of a flight: its row alone, or its directory or what learners see of it, too."""
 
 
-class FlownJob(NamedTuple):
+class FlownEntry(NamedTuple):
     """What a flight leaves.
 
     Attributes:
@@ -74,7 +74,7 @@ def flown(entry: Entry, on_step: Callable[[Progress], object] | None = None) -> 
     )
 
 
-def fly(entry: Entry, source_sha256: str, kept: Kept = "row", *, check: bool = False) -> FlownJob:
+def fly(entry: Entry, source_sha256: str, kept: Kept = "row", *, check: bool = False) -> FlownEntry:
     """Fly one flight, whatever becomes of it.
 
     Args:
@@ -98,7 +98,7 @@ def fly(entry: Entry, source_sha256: str, kept: Kept = "row", *, check: bool = F
             folder = kept_as(entry)
             files = {f"{folder}/{name}": text for name, text in flight_files(flight).items()}
     except (InputError, PlannerError) as error:
-        return FlownJob(Row.failed(entry, str(error), source_sha256), {})
+        return FlownEntry(Row.failed(entry, str(error), source_sha256), {})
     except Exception as error:  # an error in one flight must not end the others
-        return FlownJob(Row.failed(entry, described(error), source_sha256), {})
-    return FlownJob(row, files)
+        return FlownEntry(Row.failed(entry, described(error), source_sha256), {})
+    return FlownEntry(row, files)

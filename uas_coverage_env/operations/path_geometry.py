@@ -1,4 +1,6 @@
-"""Corners of legs, as an autopilot cuts them."""
+"""Paths of straight legs: distances from them, corners as an autopilot cuts them."""
+
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,16 @@ FloatArray = NDArray[np.float64]
 def distances_m(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     """(N,) distances of points (N, 3) from a straight line between two places [m]."""
     return nearest_on_segment(points, a, b).distance_m
+
+
+def leg_distances_m(points: FloatArray, path: FloatArray) -> FloatArray:
+    """(N, C - 1) distances of points (N, 3) from each leg of a path (C, 3) [m]."""
+    return np.stack([distances_m(points, a, b) for a, b in pairwise(path)], axis=1)
+
+
+def interpolated(at_s: FloatArray, times_s: FloatArray, values: FloatArray) -> FloatArray:
+    """(N, K) the values (T, K) of some times at others, on straight lines between them."""
+    return np.stack([np.interp(at_s, times_s, column) for column in values.T], axis=1)
 
 
 def cut_path(corners: FloatArray, stops: list[bool], corner_m: float) -> FloatArray:

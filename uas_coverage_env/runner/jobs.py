@@ -131,8 +131,8 @@ class Workers:
                         raise error
                     yield job, value
         finally:
-            if under_way:
-                self._started().abandon()
+            if under_way and self._crew is not None:
+                self._crew.abandon()
         if given_up:
             job, lost = given_up[0]
             raise WorkerLostError(

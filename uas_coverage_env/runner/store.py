@@ -31,7 +31,7 @@ Record = TypeVar("Record")
 
 
 class OtherVersionError(sqlite3.DatabaseError):
-    """A store of another version of this package."""
+    """A store of another version of this package, or of what adds figures to it."""
 
 
 class Store(Generic[Record]):
@@ -278,8 +278,11 @@ def _connection(path: Path, record: type) -> sqlite3.Connection:
 
 def _make_sure_of_version(connection: sqlite3.Connection, other_columns: Set[str]) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
-    if version != _SCHEMA_VERSION or other_columns:
+    if version != _SCHEMA_VERSION:
         raise OtherVersionError("was written by another version of this package")
+    if other_columns:
+        names = ", ".join(sorted(other_columns))
+        raise OtherVersionError(f"has other figures of a flight than are installed now: {names}")
 
 
 def _there(connection: sqlite3.Connection) -> set[str]:

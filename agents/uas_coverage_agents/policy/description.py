@@ -144,7 +144,7 @@ class Interval(StrictModel):
     high: float
 
 
-class PolicyScore(StrictModel):
+class ValidationScore(StrictModel):
     """How it flew scenarios that it was not trained on.
 
     Attributes:
@@ -181,7 +181,7 @@ class PolicyDescription(StrictModel):
     observation: Observation
     scenarios: ScenarioFamily
     training: Training
-    score: PolicyScore | None = None
+    score: ValidationScore | None = None
     versions: dict[Name, str]
     weights_sha256: Annotated[str, Field(pattern="^([0-9a-f]{64})?$")] = ""
 

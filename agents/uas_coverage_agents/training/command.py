@@ -2,6 +2,7 @@
 
 import math
 import shutil
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -17,7 +18,7 @@ from uas_coverage_agents.training.published import published_names
 from uas_coverage_env.cli.options import BackendOption, JobsOption
 from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.runner.jobs import Workers
+from uas_coverage_env.runner.jobs import WorkerLostError, Workers
 from uas_coverage_env.runner.store import STORE, opened
 
 if TYPE_CHECKING:
@@ -140,6 +141,9 @@ def train(
     except KeyboardInterrupt:
         screen.print("the same command goes on from the last checkpoint")
         raise
+    except WorkerLostError as error:
+        sys.stderr.write(f"error: {error}; the same command goes on\n")
+        raise typer.Exit(1) from None
     _report(screen, policy, directory)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from uas_coverage_agents.policy import Policy
-from uas_coverage_agents.policy.description import Interval, PolicyScore
+from uas_coverage_agents.policy.description import Interval, ValidationScore
 from uas_coverage_agents.policy.directory import weights_sha256
 from uas_coverage_agents.policy.planner import runner_of
 from uas_coverage_env.files.errors import PlannerError
@@ -134,14 +134,14 @@ def _measured(row: Row) -> list[float]:
     return [getattr(row, name) or 0.0 for name in _FIGURES.values()]
 
 
-def score_of(results: NDArray[np.float64], scenarios: str) -> PolicyScore:
+def score_of(results: NDArray[np.float64], scenarios: str) -> ValidationScore:
     """The means of `fly` with their 95 % bootstrap intervals.
 
     Args:
         results: (missions, measures).
         scenarios: Which they were.
     """
-    return PolicyScore(
+    return ValidationScore(
         scenarios=scenarios,
         missions=len(results),
         measures={name: interval(column) for name, column in zip(MEASURES, results.T, strict=True)},

@@ -27,7 +27,7 @@ class ActionKind:
     flies:
 
     - `arena`, the mission (`world.Arena`); `state`, the world (`world.WorldState`);
-    - `tables` and `learners`, what the environment adds (`env.memory`);
+    - `tables` and `learners`, what the environment adds (`env.episode.memory`);
     - `i`, the index of the UAS that acts;
     - `parameters`, (P,) float64, those of the kind;
     - `values`, (A,) float64, the numbers of the action, scaled to their ranges; or the choice;

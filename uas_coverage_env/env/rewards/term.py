@@ -21,7 +21,7 @@ class RewardTerm:
     Its kernel is `value(arena, state, tables, learners, scratch, i, parameters)`, compiled with
     `uas_coverage_env.compiled.kernels.kernel`. It is called after every step for each UAS i that
     flew in it, with the state after the step, and returns a finite float; `scratch` has the
-    commands and what came of them (`env.memory`), `parameters` is (P,) float64.
+    commands and what came of them (`env.episode.memory`), `parameters` is (P,) float64.
 
     Attributes:
         name: Its name in `reward_weights` and `reward_terms`.

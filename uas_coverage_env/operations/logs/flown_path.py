@@ -10,6 +10,7 @@ from uas_coverage_env.flight.of_log import Estimate, Unknown
 from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.logs.flights import LoggedFlight
 from uas_coverage_env.operations.logs.logged import Logged, Span
+from uas_coverage_env.operations.path_geometry import interpolated
 from uas_coverage_env.scenario import Scenario
 
 FloatArray = NDArray[np.float64]
@@ -68,7 +69,7 @@ class FlownPath:
 
     def places_at(self, times_s: FloatArray, start_m: FloatArray) -> FloatArray:
         """(T, 3) where it was at some times [m]: at its start before it left and once home."""
-        places_m = _interpolated(times_s, self.log.time_s, self.places_m)
+        places_m = interpolated(times_s, self.log.time_s, self.places_m)
         # the ground is under the volume in which missions are judged: how it gets to its start
         # and from there to the ground is no part of them
         near = np.linalg.norm(places_m[:, :2] - start_m[:2], axis=1) <= BESIDE_M
@@ -95,7 +96,7 @@ class FlownPath:
         """(T, 3) roll, pitch, yaw [rad]; None: not logged."""
         if self.log.attitude_rad is None:
             return None
-        return _interpolated(times_s, self.log.time_s, self.log.attitude_rad)
+        return interpolated(times_s, self.log.time_s, self.log.attitude_rad)
 
 
 def path_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame) -> FlownPath:
@@ -283,7 +284,3 @@ def _at_home(scenario: Scenario, start_m: FloatArray, places_m: FloatArray) -> N
     beside_m = np.linalg.norm(places_m[:, :2] - start_m[:2], axis=1)
     top_m = max(-start_m[2], 0.0) + scenario.landing_distance_m
     return (beside_m <= AT_HOME_M) & (-places_m[:, 2] <= top_m)
-
-
-def _interpolated(at_s: FloatArray, times_s: FloatArray, values: FloatArray) -> FloatArray:
-    return np.stack([np.interp(at_s, times_s, column) for column in values.T], axis=1)

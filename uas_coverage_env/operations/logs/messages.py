@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.logs.logged import Logged, Said, Span
+from uas_coverage_env.operations.path_geometry import interpolated
 
 FloatArray = NDArray[np.float64]
 Rows = list[tuple[Any, ...]]
@@ -282,5 +283,5 @@ def _once(rows: Rows) -> list[Said]:
 def _attitude(angles: FloatArray, times_s: FloatArray) -> FloatArray:
     """(N, 3) roll, pitch, yaw at times [rad]; yaw does not go round at the north."""
     turned = np.unwrap(angles[:, 1:], axis=0)
-    found = [np.interp(times_s, angles[:, 0], column) for column in turned.T]
-    return (np.stack(found, axis=1) + np.pi) % (2.0 * np.pi) - np.pi
+    found = interpolated(times_s, angles[:, 0], turned)
+    return (found + np.pi) % (2.0 * np.pi) - np.pi

@@ -7,7 +7,6 @@ waypoint and home from its last, above all others. What is changed is checked li
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.operations.mission_export.lay_tracks import relaid
 from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track
-from uas_coverage_env.operations.path_geometry import distances_m
+from uas_coverage_env.operations.path_geometry import leg_distances_m
 from uas_coverage_env.planning.execution.lateness import kept_m
 from uas_coverage_env.planning.execution.separation import Waits
 
@@ -155,6 +154,6 @@ def _covering_legs(flight: Flight, track: Track) -> list[int]:
         waypoint = flight.scenario.waypoints[w]
         within_m = max(waypoint.radius_m, away_m) + 1e-9
         centre = np.array([waypoint.position_m])
-        near = [distances_m(centre, a, b)[0] <= within_m for a, b in pairwise(corners)]
-        found.append(near.index(True) if True in near else len(near) - 1)
+        near = leg_distances_m(centre, corners)[0] <= within_m
+        found.append(int(near.argmax()) if near.any() else len(near) - 1)
     return found

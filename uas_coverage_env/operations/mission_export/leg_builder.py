@@ -9,7 +9,12 @@ import numpy as np
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.operations.clearance import Surroundings
 from uas_coverage_env.operations.mission_export.tracks import FloatArray, Leg, Tolerances
-from uas_coverage_env.operations.path_geometry import cut_corner, cut_path, distances_m
+from uas_coverage_env.operations.path_geometry import (
+    cut_corner,
+    cut_path,
+    distances_m,
+    leg_distances_m,
+)
 from uas_coverage_env.operations.sorties import Sortie
 
 SPENT_M = 1.0
@@ -182,6 +187,5 @@ class LegBuilder:
     def passed_m(self, corners: FloatArray, stops: list[bool]) -> FloatArray:
         """How close the path with cut corners comes to the waypoints [m]."""
         path = cut_path(corners, stops, self.tolerances.corner_m)
-        centres = self._centres[self.waypoints]
-        away = [distances_m(centres, a, b) for a, b in pairwise(path)]
-        return np.min(away, axis=0) if len(centres) else np.empty(0)
+        centres = self._centres[np.array(self.waypoints, int)]
+        return leg_distances_m(centres, path).min(axis=1)

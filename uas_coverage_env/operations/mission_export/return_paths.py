@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.operations.clearance import Surroundings
 from uas_coverage_env.operations.mission_export.tracks import Track
+from uas_coverage_env.operations.path_geometry import interpolated
 from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M
 from uas_coverage_env.planning.execution.lateness import apart_m
 from uas_coverage_env.planning.execution.leg_model import (
@@ -291,7 +292,7 @@ def _stopping_m(speed_mps: FloatArray, acceleration_mps2: float) -> FloatArray:
 def _sampled(ends_s: FloatArray, turns_m: FloatArray) -> FloatArray:
     """A path through turns as places of it."""
     clock_s = np.arange(0.0, ends_s[-1] + _STEP_S, _STEP_S)
-    return np.stack([np.interp(clock_s, ends_s, turns_m[:, c]) for c in range(3)], axis=1)
+    return interpolated(clock_s, ends_s, turns_m)
 
 
 def _near(way: Way, paths: _Paths, others: Sequence[Other], begins_s: float) -> tuple[Span, ...]:

@@ -8,13 +8,12 @@ the nearest corner instead of cutting it.
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.operations.mission_export.tracks import Track
-from uas_coverage_env.operations.path_geometry import cut_path, distances_m
+from uas_coverage_env.operations.path_geometry import cut_path, leg_distances_m
 from uas_coverage_env.planning.execution.leg_model import DT_S, Followed
 from uas_coverage_env.scenario import Scenario
 
@@ -43,8 +42,7 @@ def most_mps(scenario: Scenario, track: Track) -> tuple[float, ...]:
         waypoint = scenario.waypoints[w]
         if waypoint.max_speed_mps is not None:
             centre = np.array([waypoint.position_m])
-            away_m = [float(distances_m(centre, a, b)[0]) for a, b in pairwise(corners)]
-            n = int(np.argmin(away_m))
+            n = int(leg_distances_m(centre, corners).argmin())
             most[n] = min(most[n], SHARE * waypoint.max_speed_mps)
     ways = np.diff(corners, axis=0)  # a file sets the level part of a speed
     level = np.linalg.norm(ways[:, :2], axis=1) / np.maximum(np.linalg.norm(ways, axis=1), 1e-9)
@@ -75,8 +73,7 @@ def triggers_m(scenario: Scenario, track: Track, corner_m: float) -> tuple[float
         waypoint = scenario.waypoints[w]
         if waypoint.sensor in cameras:
             centre = np.array([waypoint.position_m])
-            corners = pairwise(track.corners_m)
-            away_m = np.array([distances_m(centre, a, b)[0] for a, b in corners])
+            away_m = leg_distances_m(centre, track.corners_m)[0]
             touched = away_m <= max(waypoint.radius_m, float(away_m.min()))
             inside_m = _length_within_m(path, centre[0], waypoint.radius_m)
             apart_m[touched] = np.minimum(apart_m[touched], inside_m)
@@ -141,5 +138,5 @@ def stopping(
         legs[n] = replace(legs[n], stop=True)
     path = cut_path(corners, [leg.stop for leg in legs], corner_m)
     centres = np.array([scenario.waypoints[w].position_m for w in track.waypoints]).reshape(-1, 3)
-    passed_m = np.min([distances_m(centres, a, b) for a, b in pairwise(path)], axis=0)
+    passed_m = leg_distances_m(centres, path).min(axis=1)
     return replace(track, legs=tuple(legs), passed_m=passed_m) if missed else track
