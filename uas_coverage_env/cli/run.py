@@ -119,7 +119,7 @@ def run(asked: Asked) -> None:
             if asked.sorties is None:
                 code = command.fly_one(mission)
             else:
-                code = command.fly_sorties(mission, asked.sorties)
+                code = command.fly_chain(mission, asked.sorties)
     finally:
         if not any(directory.iterdir()):
             directory.rmdir()
@@ -195,7 +195,7 @@ class _Run:
         limited = flight.ended == "steps" and flight.steps == steps
         return DONE if accomplished(flight) or limited else FAILED
 
-    def fly_sorties(self, scenario: Scenario, most: int) -> int:
+    def fly_chain(self, scenario: Scenario, most: int) -> int:
         """Fly sortie after sortie, and say what came of them; returns the exit code."""
         chain = fly_sorties(scenario, self.fly, most)
         code = keep_sorties(self.screen, chain, self.directory, overwrite=self.asked.overwrite)
