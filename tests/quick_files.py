@@ -43,6 +43,7 @@ QUICK = {
     "env/test_actions.py": (
         "but test_whatever_is_given_is_flown_or_refused_and_nothing_becomes_nan"
     ),
+    "env/test_cuda_missions.py": "only test_what_does_not_run_on_a_gpu_is_refused_in_one_line",
     "env/test_batch.py": (
         "only test_a_pool_holds_every_arena_as_it_is_built "
         "test_an_action_that_is_refused_changes_nothing"
@@ -59,6 +60,8 @@ QUICK = {
     ),
     "env/test_parallel_env.py": "",
     "env/test_rewards.py": "",
+    "env/test_vector_env.py": "only test_a_tile_is_the_picture_of_its_mission",
+    "env/test_versions.py": "but test_what_python_alone_flies_is_the_same",
     "files/test_strict_toml.py": "but test_whatever_is_given_the_answer_is_a_car_or_one_line",
     "flight/test_directory.py": ("but test_every_finite_number_survives_the_way_through_the_files"),
     "flight/test_metrics.py": "",

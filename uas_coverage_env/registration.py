@@ -14,7 +14,7 @@ _MODULE = re.compile(r"uas_coverage_(v(\d+))")
 LEVEL_NAMES = ("easy", "medium", "hard", "extreme")
 """Those of `tasks.LEVELS`, which is not imported here: a test compares them."""
 
-_TASKS = "uas_coverage_env.tasks"
+_TASKS = "uas_coverage_env.tasks.make"
 
 
 def register_environments() -> None:

@@ -24,14 +24,14 @@ from uas_coverage_env.env import (
     OBSERVATION_SIZE,
     REWARD,
     CoverageBatch,
-    CoverageParallelEnv,
     CoverageSwarmEnv,
     CoverageVectorEnv,
-    MissionInterface,
     MissionSettings,
     RewardTerm,
 )
+from uas_coverage_env.env.api.parallel import CoverageParallelEnv
 from uas_coverage_env.env.episode.settings import MissionKeywords, inside_name
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.env.report import INFOS
 from uas_coverage_env.env.versions import V0, Version
 

@@ -1,7 +1,7 @@
 """Tasks with levels, their environments, and scores that can be compared."""
 
 from uas_coverage_env.tasks.levels import LEVELS, level_named
-from uas_coverage_env.tasks.make import parallel_env, swarm_env, vector_env
+from uas_coverage_env.tasks.make import parallel_env
 from uas_coverage_env.tasks.scoring import Score, score
 from uas_coverage_env.tasks.task import SPLITS, Task, seeds_of
 
@@ -14,6 +14,4 @@ __all__ = [
     "parallel_env",
     "score",
     "seeds_of",
-    "swarm_env",
-    "vector_env",
 ]

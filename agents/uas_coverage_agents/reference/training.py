@@ -29,7 +29,8 @@ from uas_coverage_env.env import full_state
 from uas_coverage_env.env.observation.named import OBSERVATIONS
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.tasks import level_named, swarm_env
+from uas_coverage_env.tasks import level_named
+from uas_coverage_env.tasks.make import swarm_env
 
 STATE = "state.safetensors"
 

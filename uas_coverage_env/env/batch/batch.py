@@ -196,7 +196,7 @@ class CoverageBatch:
         Raises:
             ValueError: A seed is negative or too large, or their number is wrong.
         """
-        for lane, value in enumerate(seeds_of(seed, self.num_envs)):
+        for lane, value in enumerate(lane_seeds(seed, self.num_envs)):
             if value is not None:
                 self.lanes.seed[lane] = value
                 self.lanes.mission[lane] = -1
@@ -439,7 +439,7 @@ class CoverageBatch:
         return BatchRules(rules, autoreset, lane_code(version, settings.observation_size))
 
 
-def seeds_of(seed: Any, num_envs: int) -> list[int | None]:
+def lane_seeds(seed: Any, num_envs: int) -> list[int | None]:
     """The seed of each environment, see `CoverageBatch.seed`.
 
     Raises:

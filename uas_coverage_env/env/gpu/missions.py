@@ -16,7 +16,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions.given import accept_of_lanes
-from uas_coverage_env.env.batch.batch import seeds_of
+from uas_coverage_env.env.batch.batch import lane_seeds
 from uas_coverage_env.env.batch.checkpoint import changing, checked
 from uas_coverage_env.env.batch.memory import DRAW, SWARM_REWARD, Missions, new_missions
 from uas_coverage_env.env.batch.pool import MissionPool, ScenarioPool
@@ -171,7 +171,7 @@ class CudaMissions:
         if seed is not None:
             lanes = self.missions.lanes
             here = on_host(lanes.seed), on_host(lanes.mission)
-            for lane, value in enumerate(seeds_of(seed, self.num_envs)):
+            for lane, value in enumerate(lane_seeds(seed, self.num_envs)):
                 if value is not None:
                     here[0][lane], here[1][lane] = value, -1
             write(lanes.seed, here[0])
