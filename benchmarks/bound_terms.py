@@ -29,12 +29,12 @@ from scipy.sparse import csr_matrix
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.bound.carried import Carried
-from uas_coverage_env.bound.legs import Legs, straight_directions
+from uas_coverage_env.bound.legs import LegBounds, straight_directions
 from uas_coverage_env.bound.prices import WITHIN, Prices
 from uas_coverage_env.bound.turning import Motion, Turning, motion_of
-from uas_coverage_env.flight import energy_Wh
+from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.scenario import sample_scenario
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY
 
 FloatArray = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Known(NamedTuple):
     motion: Motion
     prices: Prices
     turning: Turning
-    legs: Legs
+    legs: LegBounds
     speed_mps: float
     reach_m: FloatArray
 

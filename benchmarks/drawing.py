@@ -19,8 +19,8 @@ import numpy as np
 from uas_coverage_env import load_scenario, uas_coverage_v0
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.env import CoverageBatch, MissionSettings
-from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.memory import TABLES
+from uas_coverage_env.env.episode.episode import Episode
+from uas_coverage_env.env.episode.memory import TABLES
 from uas_coverage_env.scenario import GeneratedScenarios, Scenario
 from uas_coverage_env.world.arena import ARENA
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from uas_coverage_agents.training.scenarios import VALIDATION, town
 
 from uas_coverage_env import Scenario, load_planner, rollout
-from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 
 NAME = "end-to-end"
 PLANNER = "learned-velocity"

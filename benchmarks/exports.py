@@ -30,7 +30,8 @@ from pymavlink import mavwp
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.operations import ExportOptions, make_export
-from uas_coverage_env.operations.tracks import Tolerances, make_tracks
+from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
+from uas_coverage_env.operations.mission_export.tracks import Tolerances
 from uas_coverage_env.scenario import Place
 
 WITH_PLACE = (16, 21, 22)

@@ -55,7 +55,7 @@ def missions_in(folder: Path) -> Flown:
     flown: Flown = {}
     for row in sorted(rows_in(folder, Row), key=lambda row: row.seed):
         if row.seed in SPLITS["test"]:
-            mission = MissionScore.of(row, LEVELS[row.level].scenario(row.seed))
+            mission = MissionScore.of(row)
             flown.setdefault(row.level, {}).setdefault(row.label, []).append(mission)
     return flown
 

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env import Flight, Scenario, generate_scenario, load_planner, rollout
-from uas_coverage_env.flight import accomplished, energy_Wh
-from uas_coverage_env.vehicle import Z
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh
+from uas_coverage_env.vehicle.layout import Z
 
 PLANNERS = ("nearest-waypoint", "lawnmower", "tour", "milp-mpc", "milp-mpc-guided")
 OPTIONS = {

@@ -7,8 +7,9 @@ from dataclasses import astuple, dataclass
 from typing import Any, Self
 
 import numpy as np
-from independent_check import Report
 from rich.table import Table
+
+from uas_coverage_env.independent_check import Report
 
 RESAMPLES = 10_000
 COLUMNS = (

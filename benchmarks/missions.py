@@ -27,7 +27,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from independent_check import BadFlightError, check
 from mission_statistics import COLUMNS, Row, flights_table, planners_table
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -35,8 +34,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import describe_planners
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.flight.registry import options_of
+from uas_coverage_env.independent_check import BadFlightError, check
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.runner.jobs import Job, Workers
 from uas_coverage_env.scenario import sample_scenario

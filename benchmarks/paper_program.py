@@ -25,11 +25,11 @@ from uas_coverage_baselines.milp_mpc import MilpMpcPaper
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.paper_planner import PaperOptions, SolvedProgram
-from uas_coverage_baselines.milp_mpc.solvers import SolveStatus
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 
 from uas_coverage_env import Flight, generate_scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import accomplished, energy_Wh
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh
 from uas_coverage_env.scenario import Scenario
 
 MARK = "the paper's program, {mission}"

@@ -23,11 +23,12 @@ from rich.console import Console
 from rich.table import Table
 from solver_watch import SECONDS, Watched, watch
 from uas_coverage_baselines.milp_mpc import MilpMpc
-from uas_coverage_baselines.milp_mpc.model.blocks import coverable
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
-from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, Formulation
+from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
+from uas_coverage_baselines.milp_mpc.model.reductions.formulations import Formulation
 from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
@@ -37,7 +38,7 @@ from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env import Flight, generate_scenario, load_planner, load_scenario, rollout
-from uas_coverage_env.geometry import inner_factor
+from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import SwarmState
@@ -52,7 +53,7 @@ _CONTRADICTION = 1e-3
 app = typer.Typer(invoke_without_command=True, add_completion=False)
 console = Console(width=170)
 
-PlannerName = Annotated[str, typer.Option(help="See `uas-coverage planners`.")]
+PlannerName = Annotated[str, typer.Option(help="See `uas-coverage planner list`.")]
 PlannerOption = Annotated[list[str] | None, typer.Option("--option", help="NAME=VALUE.")]
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.mission.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.operations import LocalFrame
+from uas_coverage_env.planning.execution.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.scenario import Place
 
 FOLDER = Path(__file__).parents[1] / "tests" / "operations" / "recorded"

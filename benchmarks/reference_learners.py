@@ -130,7 +130,7 @@ def score_of(
             if row is None:
                 row = Row.of(entry, flown(entry), "")
                 store.add(row)
-            found.append(MissionScore.of(row, scenario))
+            found.append(MissionScore.of(row))
     return found
 
 

@@ -36,12 +36,15 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import beta
 
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import LEVELS, Scenario, generate_scenario, with_disturbances
+from uas_coverage_env.scenario import Scenario, generate_scenario, with_disturbances
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import COMMAND_DTYPE, CONTACT_NAMES, FLYING, KIND_NAMES
+from uas_coverage_env.vehicle.layout import DOD
 
 FIRST_SEED = 50_000
 _VELOCITY = KIND_NAMES.index("velocity")
@@ -359,13 +362,15 @@ def main(
     ] = ",".join(POLICIES),
     first_seed: Annotated[int, typer.Option(min=0, help="Of the missions.")] = FIRST_SEED,
     wind_mps: Annotated[float, typer.Option(min=0.0, help="Constant, unknown to all.")] = 0.0,
-    level: Annotated[str, typer.Option(help=f"{', '.join(LEVELS)}; instead of --wind-mps.")] = "",
+    level: Annotated[
+        str, typer.Option(help=f"{', '.join(DISTURBANCE_LEVELS)}; instead of --wind-mps.")
+    ] = "",
     verbose: Annotated[bool, typer.Option(help="Name the missions with losses.")] = False,
 ) -> None:
     """Fly random policies until all UAS are down, and print a table."""
     if level and wind_mps:
         raise InputError("--level brings its own wind; leave out --wind-mps")
-    chosen(level, LEVELS, "level")
+    chosen(level, DISTURBANCE_LEVELS, "level")
     tallies: dict[tuple[str, str], Counter[str]] = {}
     for family in chosen(families, FAMILIES, "family"):
         for policy in chosen(policies, POLICIES, "policy"):

@@ -16,11 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env import GoTo, Scenario, World, generate_scenario
-from uas_coverage_env.autopilot import has_to_return, seconds_home, seconds_to_keep
-from uas_coverage_env.simulation import Dynamics
-from uas_coverage_env.vehicle import DOD, VehicleParams, Z, load_vehicle
+from uas_coverage_env.autopilot.return_mode import has_to_return, seconds_home, seconds_to_keep
+from uas_coverage_env.entities.codes import DynamicsName
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.entities.state import CONSUMPTION, LANDED
+from uas_coverage_env.vehicle import VehicleParams, load_vehicle
+from uas_coverage_env.vehicle.layout import DOD, Z
 from uas_coverage_env.vehicle.stopping import stopping_of
-from uas_coverage_env.world import CONSUMPTION, CONTACT_NAMES, LANDED, Command, Velocity
+from uas_coverage_env.world import Command, Velocity
 
 STATES_OF_A_TOWN = 5
 FLYABLE = 2.0 / 3.0
@@ -152,7 +155,7 @@ def _fly(world: World, command: Command) -> Returned:
 
 
 def flown_states(
-    seed: int, vehicle: str, dynamics: Dynamics, wind_mps: float
+    seed: int, vehicle: str, dynamics: DynamicsName, wind_mps: float
 ) -> Iterator[Returned]:
     """The flights from the states of a town, return mode and safety filter on.
 

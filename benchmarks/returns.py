@@ -46,17 +46,20 @@ from return_states import flown_states, flown_wind_mps
 from rich.console import Console
 from rich.table import Table
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
-    seconds_home as milp_seconds_home,
+    straight_seconds_home,
 )
 
 from uas_coverage_env import GoTo, MissionBrief, Scenario, World, generate_scenario
-from uas_coverage_env.autopilot import flight_home, seconds_home, seconds_to_keep
+from uas_coverage_env.autopilot.return_mode import seconds_home, seconds_to_keep
+from uas_coverage_env.autopilot.return_path import flight_home
+from uas_coverage_env.entities.codes import DynamicsName
+from uas_coverage_env.entities.state import CONSUMPTION, LANDED
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import Range
 from uas_coverage_env.scenario import with_disturbances
-from uas_coverage_env.simulation import Dynamics
-from uas_coverage_env.vehicle import DOD, dod_per_s, load_vehicle
-from uas_coverage_env.world import CONSUMPTION, LANDED
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.vehicle.range import dod_per_s
 
 RETURNS_OF_A_TOWN = 5
 _NEAREST_M = 15.0
@@ -116,7 +119,7 @@ def _place(scenario: Scenario, rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def flown_returns(
-    seed: int, dynamics: Dynamics = "lpv", level: str | None = None
+    seed: int, dynamics: DynamicsName = "lpv", level: str | None = None
 ) -> Iterator[Return]:
     """The returns of a town.
 
@@ -155,7 +158,7 @@ def estimates(flown: Return) -> tuple[list[float], list[float]]:
     home = Range(brief).home(0, x)
     called_s = max(seconds_home(world.arena, 0, x), seconds_to_keep(world.arena, 0, x, math.inf))
     vehicle = brief.vehicles[0]
-    planned_s = milp_seconds_home(vehicle, x[:3] - np.array(brief.uas[0].start_m))
+    planned_s = straight_seconds_home(vehicle, x[:3] - np.array(brief.uas[0].start_m))
     return (
         [home.time_s, home.time_s + home.time_margin_s, called_s, planned_s],
         [
@@ -190,7 +193,7 @@ def _table(title: str, columns: Sequence[str], errors: NDArray[np.float64], digi
 
 
 def _states(
-    seeds: Sequence[int], vehicle: str, flown_as: Sequence[Dynamics], winds_mps: Sequence[float]
+    seeds: Sequence[int], vehicle: str, flown_as: Sequence[DynamicsName], winds_mps: Sequence[float]
 ) -> int:
     """Print how many UAS return mode loses; returns the exit code."""
     parameters = load_vehicle(vehicle)
@@ -241,15 +244,17 @@ def main(
     ] = None,
 ) -> None:
     """Fly returns and print by how much estimates of time and charge err, or which are lost."""
-    if dynamics not in (None, *get_args(Dynamics)):
-        raise InputError(f"unknown dynamics {dynamics!r}; allowed: {', '.join(get_args(Dynamics))}")
+    if dynamics not in (None, *get_args(DynamicsName)):
+        raise InputError(
+            f"unknown dynamics {dynamics!r}; allowed: {', '.join(get_args(DynamicsName))}"
+        )
     if vehicle is None and wind is not None:
         raise InputError("--wind needs --vehicle; without, give a --level")
     if vehicle is not None:
         if level is not None:
             raise InputError("--vehicle flies in steady wind: give --wind in place of --level")
         seeds = range(first_seed, first_seed + towns)
-        flown_as = get_args(Dynamics) if dynamics is None else (cast(Dynamics, dynamics),)
+        flown_as = get_args(DynamicsName) if dynamics is None else (cast(DynamicsName, dynamics),)
         raise typer.Exit(_states(seeds, vehicle, flown_as, WINDS_MPS if wind is None else (wind,)))
     dynamics = dynamics or "lpv"
     if level not in _LEVELS:
@@ -257,7 +262,7 @@ def main(
     columns, estimate = (COLUMNS, estimates) if level is None else (IN_WIND, estimates_in_wind)
     times, charges, ways_m = [], [], []
     for seed in range(first_seed, first_seed + towns):
-        for flown in flown_returns(seed, cast(Dynamics, dynamics), level):
+        for flown in flown_returns(seed, cast(DynamicsName, dynamics), level):
             estimated_s, estimated_dod = estimate(flown)
             times.append(flown.time_s - np.array(estimated_s))
             charges.append(100.0 * (flown.dod - np.array(estimated_dod)))

@@ -32,10 +32,12 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, generate_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import COMMAND_DTYPE, CONTACT_NAMES, FLYING, KIND_NAMES, LANDED
 
 FIRST_SEED = 4100
 LEAST_UAS, MOST_UAS = 2, 8

@@ -24,7 +24,8 @@ from uas_coverage_agents.training.route_labels import town_of
 
 from uas_coverage_env import MissionBrief, Scenario, load_planner, rollout
 from uas_coverage_env.leaderboard import seed_range
-from uas_coverage_env.world import CLEAR, build_arena, route
+from uas_coverage_env.world import build_arena
+from uas_coverage_env.world.routes import CLEAR, route
 
 WEIGHT_ENERGY = 0.6
 TURNS_DEG = (0, 45, 90, 135)

@@ -34,11 +34,12 @@ from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
 
 from uas_coverage_env import MissionBrief, Scenario
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.runner.jobs import Job, Workers
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import CONTACT_NAMES, Command, SwarmState
+from uas_coverage_env.world import Command, SwarmState
 
 FIRST_SEED = 4000
 _AREA_INSET_M = 10.0

@@ -23,14 +23,8 @@ from statistics import median
 from typing import NamedTuple
 
 from uas_coverage_env import Scenario, generate_scenario, load_planner, rollout
-from uas_coverage_env.flight import (
-    Flight,
-    energy_Wh,
-    fly_sorties,
-    packs_used,
-    sorties_summary,
-)
-from uas_coverage_env.flight.metrics import open_waypoints
+from uas_coverage_env.flight import Flight, fly_sorties, sorties_summary
+from uas_coverage_env.flight.metrics import energy_Wh, open_waypoints, packs_used
 from uas_coverage_env.scenario.packs import Sorties
 
 PLANNERS = ("nearest-waypoint", "trajectory")

@@ -120,7 +120,7 @@ def _village_cuda(num_envs: int, threads: int) -> Steps:
     import numpy as np
     from numba import cuda
 
-    from uas_coverage_env.env.cuda import CudaMissions
+    from uas_coverage_env.env.gpu.missions import CudaMissions
 
     flown = CudaMissions(num_envs)
     acted: Any = flown.missions.acted  # on the GPU

@@ -15,26 +15,22 @@ from rich.table import Table
 
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.views import lane_view, rows_view, slice_view
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.act import acting_of, write_commands
-from uas_coverage_env.env.actions.velocity import VELOCITY
-from uas_coverage_env.env.kernel import Rules, step_learners
-from uas_coverage_env.env.memory import SCRATCH, Learners, Scratch
-from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE
-from uas_coverage_env.env.observation.block import firsts_of
-from uas_coverage_env.env.observation.moving_obstacles import write_moving_obstacles
+from uas_coverage_env.env.batch.pool import learners_of, tables_at
+from uas_coverage_env.env.episode.act import acting_of, write_commands_with
+from uas_coverage_env.env.episode.memory import SCRATCH, Learners, Scratch
+from uas_coverage_env.env.episode.observe import noted, observe_one_with, observing_of
+from uas_coverage_env.env.episode.pay import compute_rewards_with, paying_of
+from uas_coverage_env.env.episode.step import Rules, step_learners_with
+from uas_coverage_env.env.observation import OBSERVATION_SIZE, ObservationBlock
 from uas_coverage_env.env.observation.nearest import nearest_waypoints
-from uas_coverage_env.env.observation.others import write_others
-from uas_coverage_env.env.observation.surroundings import write_surroundings
-from uas_coverage_env.env.observation.waypoints import write_waypoints
-from uas_coverage_env.env.observe import observe_one, observing_of
-from uas_coverage_env.env.pool import learners_of, tables_at
-from uas_coverage_env.env.reward_kernel import compute_rewards, paying_of
-from uas_coverage_env.env.rewards import REWARD
-from uas_coverage_env.simulation import advance
+from uas_coverage_env.env.versions import V0
+from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.simulation.pool import arena_of, state_of
-from uas_coverage_env.vehicle import N_STATES, lpv_step
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.simulation.step import advance
+from uas_coverage_env.vehicle import lpv_step
+from uas_coverage_env.vehicle.layout import N_STATES
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.contacts import (
     check_fence_and_battery,
@@ -56,9 +52,10 @@ compiled = njit(error_model="numpy")
 NO_ASSISTANTS = np.zeros(0, np.int64)
 """No assistants."""
 
-AT = firsts_of(OBSERVATION)
-SIZE = type(AT)(*(block.size for block in OBSERVATION))
-"""Where the columns of each block begin, and how many they are."""
+write_commands = write_commands_with(V0.actions)
+compute_rewards = compute_rewards_with(V0.reward)
+observe_one = observe_one_with(V0.observation)
+step_learners = step_learners_with(V0)
 
 
 class View(NamedTuple):
@@ -82,12 +79,12 @@ def _world(arena, state, tables, view, rules, spare, row):
 def _observation(arena, state, tables, view, rules, spare, row):
     for i in range(state.uas.shape[0]):
         if state.uas[i].status == FLYING:
-            observe_one(arena, state, tables, view.learners, rules.observing, i, row[i], None)
+            observe_one(arena, state, tables, view.learners, rules.observing, i, row[i])
 
 
 @compiled
 def _actions(arena, state, tables, view, rules, spare, row):
-    write_commands(arena, state, tables, view.learners, view.scratch, rules.acting, None)
+    write_commands(arena, state, tables, view.learners, view.scratch, rules.acting)
 
 
 @compiled
@@ -121,13 +118,13 @@ def _other_contacts(arena, state, tables, view, rules, spare, row):
 
 @compiled
 def _coverage(arena, state, tables, view, rules, spare, row):
-    cover(arena, state, view.scratch.outcome)
+    cover(arena, state, state.step[0] + 1, view.scratch.outcome)
     land(arena, state, view.scratch.outcome)
 
 
 @compiled
 def _reward(arena, state, tables, view, rules, spare, row):
-    compute_rewards(arena, state, tables, view.learners, view.scratch, rules.paying, None)
+    compute_rewards(arena, state, tables, view.learners, view.scratch, rules.paying)
 
 
 @compiled
@@ -137,31 +134,25 @@ def _nearest(arena, state, tables, view, rules, spare, row):
             nearest_waypoints(arena, state, i, view.learners.candidates[i])
 
 
-@compiled
-def _waypoints(arena, state, tables, view, rules, spare, row):
-    for i in range(state.uas.shape[0]):
-        if state.uas[i].status == FLYING:
-            columns = slice_view(row[i], AT.waypoints, SIZE.waypoints)
-            write_waypoints(arena, state, tables, view.learners, i, columns)
+def _block(block: ObservationBlock, column: int) -> Any:
+    """A block, with what it needs that no block before it has noted."""
+    notes = tuple(set(block.needs) - _noted)
+    _noted.update(notes)
+    write, size, note = block.write, block.size, noted(notes)
+
+    @compiled
+    def write_block(arena, state, tables, view, rules, spare, row):
+        for i in range(state.uas.shape[0]):
+            if state.uas[i].status == FLYING:
+                note(arena, state, tables, view.learners, i)
+                columns = slice_view(row[i], column, size)
+                write(arena, state, tables, view.learners, i, rules.observing.parameters, columns)
+
+    return write_block
 
 
-@compiled
-def _surroundings(arena, state, tables, view, rules, spare, row):
-    for i in range(state.uas.shape[0]):
-        if state.uas[i].status == FLYING:
-            columns = slice_view(row[i], AT.surroundings, SIZE.surroundings)
-            write_surroundings(arena, state, i, columns)
-
-
-@compiled
-def _movers(arena, state, tables, view, rules, spare, row):
-    for i in range(state.uas.shape[0]):
-        if state.uas[i].status == FLYING:
-            columns = slice_view(row[i], AT.others, SIZE.others)
-            write_others(arena, state, tables, i, columns)
-            columns = slice_view(row[i], AT.moving_obstacles, SIZE.moving_obstacles)
-            write_moving_obstacles(arena, state, tables, i, columns)
-
+_noted: set[Any] = set()
+_columns = np.cumsum([0, *(block.size for block in V0.observation)]).tolist()
 
 PARTS: dict[str, Callable[..., None]] = {
     "actions into commands": _actions,
@@ -172,9 +163,10 @@ PARTS: dict[str, Callable[..., None]] = {
     "coverage and landing": _coverage,
     "reward": _reward,
     "observation: nearest waypoints": _nearest,
-    "observation: their features": _waypoints,
-    "observation: rays and clearances": _surroundings,
-    "observation: other movers": _movers,
+    **{
+        f"observation: {block.name.replace('_', ' ')}": _block(block, column)
+        for block, column in zip(V0.observation, _columns, strict=False)
+    },
     "the whole observation": _observation,
     "the whole world": _world,
     WHOLE: _whole,
@@ -212,9 +204,11 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     shape = batch.learners.asked.shape
     for _ in range(N_STEPS):
         batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
-    paying = paying_of(REWARD, np.ones(len(REWARD)))
+    paying = paying_of(V0.reward, np.ones(len(V0.reward)), V0.reward)
+    acting = acting_of(V0.actions[0], V0.actions)
+    observing = observing_of(V0.observation, V0.observation)
     rules = Rules(
-        acting_of(VELOCITY), False, NO_ASSISTANTS, None, paying, observing_of(OBSERVATION)
+        acting, False, NO_ASSISTANTS, feature_code((), otherwise=False), paying, observing
     )
     arguments: tuple[Any, ...] = (
         batch.pool.arrays, batch.missions,

@@ -41,7 +41,8 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 
 from uas_coverage_env import MissionBrief, Scenario, load_scenario
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import energy_Wh, rollout
+from uas_coverage_env.flight import rollout
+from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation import World

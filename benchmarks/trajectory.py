@@ -36,7 +36,8 @@ from uas_coverage_env import (
     rollout,
 )
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Planner, accomplished, energy_Wh
+from uas_coverage_env.flight import Planner
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.world import Command

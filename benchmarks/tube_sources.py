@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.in_wind import position_gain
 
 from uas_coverage_env import generate_scenario
-from uas_coverage_env.scenario import LEVELS
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.layout import POSITION, RATE, SPEED
@@ -140,7 +140,7 @@ def main(
     tube = tube_of(flown, dt_s, steps, learns=True)
     tight, alpha = held(flown, dt_s, steps)
     rest_m = turbulence_m(flown, dt_s, scale_s, steps)
-    for name in LEVELS if level == "all" else (level,):
+    for name in DISTURBANCE_LEVELS if level == "all" else (level,):
         scenario = generate_scenario(1, n_uas=1, n_waypoints=4, n_obstacles=0, disturbances=name)
         stated, wind = scenario.conditions, scenario.wind
         assert stated is not None

@@ -32,9 +32,8 @@ from uas_coverage_agents.waypoint.sub_environments import (
 from uas_coverage_agents.waypoint.team import ENERGY, LEFT, LOST_UAS, NO_UAS, NOT_HOME, TIME
 
 from uas_coverage_env import Scenario, load_planner, load_scenario, rollout
-from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.flight import coverage, energy_Wh, home
-from uas_coverage_env.flight.metrics import decision_time_s
+from uas_coverage_env.autopilot.assist import assistants
+from uas_coverage_env.flight.metrics import coverage, energy_Wh, home, percentiles
 from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
@@ -49,7 +48,7 @@ def flown(scenarios: Sequence[Scenario], name: str, options: dict[str, Any]) -> 
     rows = []
     for scenario in scenarios:
         flight = rollout(scenario, planner)
-        thought_s = decision_time_s(flight)
+        thought_s = percentiles(flight, "duration_s")
         rows.append(
             (
                 coverage(flight), home(flight).all(), len(flight.violations), flight.breaches,

@@ -17,7 +17,8 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env import Flight, Scenario, generate_scenario, load_planner, rollout
 from uas_coverage_env.draw import picture
-from uas_coverage_env.flight import flight_picture, summary
+from uas_coverage_env.flight import flight_picture
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.replay import write_replay
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World

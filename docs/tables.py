@@ -1,6 +1,7 @@
 """Tables of the pages that say what the code says: spaces, scenario files, planners.
 
-    python docs/tables.py            renew them, and `scenario.schema.json`
+    python docs/tables.py            renew them, `scenario.schema.json`, and what the docstrings of
+                                     the environments say of their settings
     python docs/tables.py --check    name the pages that are stale, and exit 1 where there are any
 
 Tables are committed, so that a code host shows them too. They stand in any page of `docs/`, and
@@ -14,7 +15,6 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,21 +23,26 @@ from families_picture import families_table
 from gymnasium import spaces
 
 from uas_coverage_env import load_scenario, uas_coverage_v0
-from uas_coverage_env.env import CoverageParallelEnv, CoverageSwarmEnv, CoverageVectorEnv
-from uas_coverage_env.env.actions import ACTION_NAMES, ACTIONS, HOME_CHOICE, actions_of
-from uas_coverage_env.env.observation import (
-    OBSERVATION,
-    OBSERVATION_SIZE,
-    full_state,
-    grid,
-    layout_table,
-    local,
+from uas_coverage_env.env import (
+    CoverageBatch,
+    CoverageParallelEnv,
+    CoverageSwarmEnv,
+    CoverageVectorEnv,
 )
-from uas_coverage_env.env.rewards import rewards_table
-from uas_coverage_env.env.screen import RENDER_MODES
-from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.flight import Why
+from uas_coverage_env.env.actions import ACTIONS, HOME_CHOICE
+from uas_coverage_env.env.actions.given import actions_of
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
+from uas_coverage_env.env.api.aec import in_turns
+from uas_coverage_env.env.api.documentation import with_settings_written_out
+from uas_coverage_env.env.batch.memory import FINAL, LANES
+from uas_coverage_env.env.episode.memory import LEARNERS
+from uas_coverage_env.env.observation import OBSERVATION, OBSERVATION_SIZE, full_state, grid, local
+from uas_coverage_env.env.observation.layout import layout_table
+from uas_coverage_env.env.rendering.screen import RENDER_MODES
+from uas_coverage_env.env.rewards.terms import rewards_table
+from uas_coverage_env.flight import Why, figures
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
+from uas_coverage_env.leaderboard.scores import columns
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
 
@@ -192,19 +197,13 @@ def arguments() -> str:
     """The arguments of the environment as a table, with their defaults."""
     text = docstring_section("Arguments")()
     meanings = dict(re.findall(r"^(\w+): (.*(?:\n +.*)*)", text, re.MULTILINE))
-    parameters = inspect.signature(CoverageParallelEnv.__init__).parameters.values()
-    defaults = {
-        **{parameter.name: parameter.default for parameter in parameters},
-        **{field.name: field.default for field in fields(MissionSettings)},
-    }
+    parameters = inspect.signature(CoverageParallelEnv).parameters.values()
+    defaults = {parameter.name: parameter.default for parameter in parameters}
     rows = [
-        (f"`{name}`", f"`{_NAMED.get(name, repr(defaults[name]))}`", " ".join(meaning.split()))
+        (f"`{name}`", f"`{defaults[name]!r}`", " ".join(meaning.split()))
         for name, meaning in meanings.items()
     ]
     return table(("argument", "default", "meaning"), rows)
-
-
-_NAMED = {"observation": "OBSERVATION", "reward": "REWARD"}
 
 
 def scenario_fields() -> str:
@@ -336,27 +335,62 @@ def _without_meanings(rows: str) -> str:
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
 
 
-OPERATIONS = {
-    "areas": ("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
-    "exports": ("exported_files", "autopilot_parameters", "autopilot_failures"),
-    "streams": ("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
-    "logs": ("log_formats", "log_rules"),
-}
-"""Tables of `uas_coverage_env.operations.tables`, by module."""
+def flight_figures() -> str:
+    """Every figure of a flight: its name, its key in the file, what it is."""
+    rows = [
+        (
+            f"`{name}`",
+            f"`{key}`" if (key := each.key_in_file) else "",
+            each.meaning,
+        )
+        for name, each in FIGURES.items()
+    ]
+    return table(("figure", "in `summary.json`", ""), rows)
 
 
-def of_operations(module: str, name: str) -> Callable[[], str]:
-    """A table that `uas_coverage_env.operations` makes, which needs the extra `ops`."""
+def comparison_columns() -> str:
+    """Every column of a comparison: its heading, its name in the files, what it is."""
+    rows = [
+        (f"*{each.heading}*" if each.table else "", f"`{name}`", each.meaning)
+        for name, each in columns().items()
+    ]
+    return table(("in the tables", "in the files", ""), rows)
 
-    def made() -> str:
-        found = importlib.import_module(f"uas_coverage_env.operations.tables.{module}")
-        head, rows = getattr(found, name)()
-        return table(head, rows)
 
-    return made
+FIGURES = {each.name: each for each in figures.FIGURES}
+"""Those of this package, whatever others are installed."""
+
+OPERATIONS = (
+    *("area_roles", "area_words", "plan_items", "town_kinds", "town_not_read"),
+    *("exported_files", "autopilot_parameters", "autopilot_failures", "log_formats", "log_rules"),
+    *("stream_troubles", "stream_failsafes", "stream_reactions", "stream_limits"),
+)
+"""Functions of operations_tables.py, which needs the extra `ops`."""
+
+
+def of_operations(name: str) -> str:
+    """One of these tables."""
+    return table(*getattr(importlib.import_module("operations_tables"), name)())
+
+
+def batch_arrays() -> str:
+    """The arrays of a batch: from the declarations, and what is said below each field there."""
+    places = ((LANES, "batch.lanes"), (LEARNERS, "batch.learners"), (FINAL, "batch.missions.final"))
+    rows = []
+    for memory, place in places:
+        text = inspect.getsource(memory.declaration)
+        said = dict(re.findall(r'^    (\w+): Annotated.*?\n    """(.*?)"""', text, re.M | re.S))
+        lanes = () if memory is LANES or memory is FINAL else ("L",)
+        for field in memory.fields:
+            axes = ", ".join(str(axis) for axis in (*lanes, *field.axes))
+            kind = "record" if field.dtype.names else str(field.dtype)
+            meaning = " ".join(said.get(field.name, "").split())
+            rows.append((f"`{place}.{field.name}`", f"({axes})", kind, meaning))
+    return table(("array", "shape", "dtype", "meaning"), rows)
 
 
 PARTS: dict[str, Callable[[], str]] = {
+    "batch_arrays": batch_arrays,
     "environments": environments,
     "environment_summary": environment_summary,
     "observation_groups": observation_groups,
@@ -375,8 +409,10 @@ PARTS: dict[str, Callable[[], str]] = {
     "event_fields": event_fields,
     "families": families_table,
     "planners": planners,
+    "figures": flight_figures,
+    "comparison_columns": comparison_columns,
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
-    **{name: of_operations(room, name) for room, names in OPERATIONS.items() for name in names},
+    **{name: partial(of_operations, name) for name in OPERATIONS},
 }
 
 
@@ -413,8 +449,14 @@ def renewed_files() -> dict[Path, str]:
         text = page.read_text(encoding="utf-8")
         if "<!-- generated: " in text:
             files[page] = renewed(text)
+    for module in _SAY_SETTINGS:
+        source = Path(inspect.getfile(module))
+        files[source] = with_settings_written_out(source.read_text(encoding="utf-8"))
     return {**files, SCHEMA: json.dumps(scenario_schema(), indent=2, ensure_ascii=False) + "\n"}
 
+
+_SAY_SETTINGS = (CoverageParallelEnv, CoverageSwarmEnv, CoverageVectorEnv, CoverageBatch, in_turns)
+"""In the files of these are docstrings that name all settings."""
 
 _READMES = ("README.md", "baselines/README.md", "agents/README.md", "benchmarks/README.md")
 

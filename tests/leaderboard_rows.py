@@ -3,7 +3,8 @@
 import dataclasses
 from pathlib import Path
 
-from uas_coverage_env.leaderboard import FAILED, FLOWN, TIMES, Row
+from uas_coverage_env.leaderboard import Row
+from uas_coverage_env.leaderboard.row import FAILED, FLOWN, TIMES
 from uas_coverage_env.runner.store import rows_in
 
 
@@ -22,6 +23,8 @@ def row(scenario="a", label="p", seed=0, **changes) -> Row:
         "safety_filter": False,
         "status": FLOWN,
         "reason": None,
+        "verdict": None,
+        "failed_figures": None,
         "accomplished": True,
         "coverage": 1.0,
         "all_home": True,
@@ -48,7 +51,7 @@ def row(scenario="a", label="p", seed=0, **changes) -> Row:
     return Row(**{**usual, **changes})
 
 
-def failed_row(scenario="a", label="p", seed=0, reason="refused") -> Row:
+def failed_row(scenario="a", label="p", seed=0, reason="refused", **changes) -> Row:
     """A flight that there is none of."""
     nothing = dict.fromkeys(
         (
@@ -63,7 +66,7 @@ def failed_row(scenario="a", label="p", seed=0, reason="refused") -> Row:
     return row(
         *(scenario, label, seed),
         **{"status": FAILED, "reason": reason, "accomplished": False, "coverage": 0.0},
-        **{"all_home": False, "home": 0, "wall_time_s": None, **nothing},
+        **{"all_home": False, "home": 0, "wall_time_s": None, **nothing, **changes},
     )
 
 

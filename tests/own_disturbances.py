@@ -3,8 +3,10 @@
 import math
 
 from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.features import Disturbance, normal, perturb, uniform
-from uas_coverage_env.vehicle import LIFT, PERTURBATIONS
+from uas_coverage_env.features import Disturbance, normal, uniform
+from uas_coverage_env.features.true_vehicles import perturb
+from uas_coverage_env.vehicle.layout import LIFT
+from uas_coverage_env.vehicle.true_vehicle import PERTURBATIONS
 
 
 @kernel

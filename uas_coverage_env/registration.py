@@ -1,5 +1,7 @@
 """The names under which Gymnasium and PettingZoo find the environments."""
 
+import re
+
 import gymnasium
 import pettingzoo
 
@@ -7,6 +9,9 @@ GYMNASIUM_ID = "UASCoverage-v0"
 PETTINGZOO_ID = "uas/coverage-v0"
 LEVEL_NAMES = ("easy", "medium", "hard", "extreme")
 """Those of `tasks.LEVELS`, which is not imported here: a test compares them."""
+
+VERSIONS = (0,)
+"""Of the environments that there are, each in a module `uas_coverage_vN`."""
 
 _DOOR = "uas_coverage_env.uas_coverage_v0"
 _TASKS = "uas_coverage_env.tasks"
@@ -45,3 +50,14 @@ def register_environments() -> None:
             if name not in pettingzoo.parallel_registry:
                 kwargs = {"level": level}
                 pettingzoo.register("parallel", name, f"{_TASKS}:parallel_env", kwargs=kwargs)
+
+
+def successor_of(name: str) -> str | None:
+    """The module of environments that has followed one which is gone; None: it is none of those.
+
+    Gymnasium and PettingZoo say the same of the ids in their registries.
+    """
+    number = re.fullmatch(r"uas_coverage_v(\d+)", name)
+    if number is None or int(number[1]) >= min(VERSIONS):
+        return None
+    return f"uas_coverage_v{min(VERSIONS)}"

@@ -3,8 +3,10 @@
 Version history: v0, first version.
 """
 
-from uas_coverage_env.env import CoverageParallelEnv, env, raw_env
+from uas_coverage_env.env.api.aec import env, raw_env
+from uas_coverage_env.env.api.parallel import CoverageParallelEnv
+from uas_coverage_env.env.api.vector import vector_env
 
 parallel_env = CoverageParallelEnv
 
-__all__ = ["env", "parallel_env", "raw_env"]
+__all__ = ["env", "parallel_env", "raw_env", "vector_env"]

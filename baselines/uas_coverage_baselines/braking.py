@@ -3,7 +3,8 @@
 import numpy as np
 
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.vehicle import lpv_step, reseed_reference, velocity_climb_wrench
+from uas_coverage_env.vehicle import lpv_step
+from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
 
 
 @allocating_kernel

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.by_legs import LegFollower
+from uas_coverage_baselines.by_legs.follower import LegFollower
 from uas_coverage_baselines.targets import Targets, warm_up_once
 from uas_coverage_env.flight import AssistedOptions
-from uas_coverage_env.mission import Handover, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.handover import Handover
 from uas_coverage_env.planning.reserves import LAWNMOWER
-from uas_coverage_env.vehicle import dod_per_s
-from uas_coverage_env.vehicle.range import level_seconds, speeds_of
+from uas_coverage_env.vehicle.range import dod_per_s, level_seconds, speeds_of
 from uas_coverage_env.world import Command, SwarmState
 
 # Share of the charge that a run may be planned to use.

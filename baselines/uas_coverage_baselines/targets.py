@@ -7,13 +7,9 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.flight import Planner
-from uas_coverage_env.mission import (
-    GuidedFlight,
-    Handover,
-    MissionBrief,
-    WorldView,
-    first_sight,
-)
+from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission.guided_flight import GuidedFlight
+from uas_coverage_env.mission.handover import Handover
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 

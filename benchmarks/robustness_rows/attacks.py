@@ -13,8 +13,8 @@ from gymnasium import spaces
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
 from uas_coverage_env import generate_scenario, uas_coverage_v0
-from uas_coverage_env.env.actions import ACTION_NAMES
-from uas_coverage_env.world import CONTACT_NAMES
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 
 FIRST_SEED = 8000
 EPISODES_OF_A_TOWN = 10

@@ -13,14 +13,14 @@ from scipy.integrate import solve_ivp
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
 from uas_coverage_env import Scenario, generate_scenario, load_planner, load_vehicle, rollout
-from uas_coverage_env.simulation import Dynamics
+from uas_coverage_env.entities.codes import DynamicsName
 
 FIRST_SEED = 13000
 MOST_DOD, MOST_V, MOST_WH = 1e-6, 0.1, 1e-3
 """The largest deviations that are claimed: of the depth of discharge, of the voltage [V], and of
 the energy [share]."""
 
-CASES: Mapping[str, tuple[Dynamics, str]] = {
+CASES: Mapping[str, tuple[DynamicsName, str]] = {
     "LPV model": ("lpv", "s500_v2"),
     "6-DOF plant": ("nonlinear", "s500_v2"),
     "hexacopter": ("lpv", "hexacopter"),

@@ -10,7 +10,8 @@ import numpy as np
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
 from uas_coverage_env import Scenario, generate_scenario, load_planner, rollout
-from uas_coverage_env.flight import Flight, accomplished, home
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.metrics import accomplished, home
 
 FIRST_SEED = 7000
 PLANNERS = ("nearest-waypoint", "tour", "trajectory", "learned-waypoint")

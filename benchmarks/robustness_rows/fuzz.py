@@ -179,7 +179,7 @@ def _directory(
 
 
 _CONFIGS = ("maskable-ppo", "ppo", "ppo-end-to-end", "sac")
-_CHECK = ("scenarios", "check", "--picture", "{folder}/map.png")
+_CHECK = ("scenario", "check", "--picture", "{folder}/map.png")
 _SCENARIOS = ("village", "open_field", "corridor")
 KINDS: Mapping[str, Callable[[Rng, Path], str]] = {
     **{

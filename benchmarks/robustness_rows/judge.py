@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from flight_distances import cylinder_distance, hull_distance, least_on_segments
 from numpy.typing import NDArray
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
-from uas_coverage_env.geometry import ConvexPolytope, cylinder_clearance, segment_clearance
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
+from uas_coverage_env.independent_check.distances import (
+    cylinder_distance,
+    hull_distance,
+    least_on_segments,
+)
 
 FIRST_SEED = 12000
 SEGMENTS = 1000
@@ -94,7 +99,7 @@ ROW = Row(
     "The judge against the independent checker",
     "segments",
     f"the smallest distances of a straight segment from a body are the same to {SAME_M:g} m: that "
-    "of the judge, in closed form, and that of `benchmarks/flight_distances.py`, by narrowing a "
+    "of the judge, in closed form, and that of `independent_check/distances.py`, by narrowing a "
     "convex function",
     trials,
     finding,

@@ -10,11 +10,10 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from independent_check import BadFlightError, check
-
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
+from uas_coverage_env.independent_check import BadFlightError, check
 
 FIRST_SEED = 11_000
 KILLS_OF_A_TRIAL = 10

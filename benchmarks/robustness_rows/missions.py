@@ -9,7 +9,7 @@ from itertools import product
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown, share
 from uas_coverage_env import load_planner, rollout
-from uas_coverage_env.flight import accomplished, coverage, energy_Wh, home
+from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.scenario.families.generated import N_OBSTACLES, N_UAS, N_WAYPOINTS
 

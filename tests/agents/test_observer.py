@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from uas_coverage_env import MissionBrief, generate_scenario, load_scenario
-from uas_coverage_env.env import CoverageParallelEnv, Observer
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.env import CoverageParallelEnv, MissionInterface
 
 
 @pytest.mark.parametrize("assisted", [False, True])
@@ -16,7 +16,7 @@ def test_a_planner_sees_what_a_learner_sees(name, assisted):
     )
     env = CoverageParallelEnv(scenario, return_mode=assisted, safety_filter=assisted)
     observations, _ = env.reset(seed=0)
-    observer = Observer(MissionBrief.of(scenario))
+    observer = MissionInterface(MissionBrief.of(scenario))
     rng = np.random.default_rng(4)
     held = {}
     for k in range(120):

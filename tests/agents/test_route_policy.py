@@ -24,12 +24,13 @@ from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRout
 from uas_coverage_env import generate_scenario, rollout
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.lookahead import fixed_slack
-from uas_coverage_env.entities.commands import VELOCITY
-from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
+from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.raised import raised
-from uas_coverage_env.vehicle import THETA, VX, VY, X, fly_kinematics
-from uas_coverage_env.world import COMMAND_DTYPE, build_arena
+from uas_coverage_env.vehicle.layout import THETA, VX, VY, X
+from uas_coverage_env.vehicle.lpv import fly_kinematics
+from uas_coverage_env.world import build_arena
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from uas_coverage_agents.policy import Mlp, Towns, load_policy, save_policy
+from uas_coverage_agents.policy import load_policy, save_policy
+from uas_coverage_agents.policy.description import Towns
+from uas_coverage_agents.policy.mlp import Mlp
 from uas_coverage_agents.policy.planner import PolicyPlanner
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.layers import layers_of
@@ -36,12 +38,12 @@ from uas_coverage_agents.velocity.planner import SHIPPED
 from uas_coverage_env import generate_scenario, rollout
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import PLENTY_M
-from uas_coverage_env.entities.commands import VELOCITY
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.vehicle import VX, VY, X, Y, Z
-from uas_coverage_env.world import COMMAND_DTYPE, Velocity, build_arena
+from uas_coverage_env.vehicle.layout import VX, VY, X, Y, Z
+from uas_coverage_env.world import Velocity, build_arena
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,8 @@ from uas_coverage_agents.training.velocity_learning import (
 )
 
 from uas_coverage_env import generate_scenario, rollout
-from uas_coverage_env.flight import accomplished, energy_Wh, load_planner
+from uas_coverage_env.flight import load_planner
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.scenario import Wind, with_disturbances
 from uas_coverage_env.world import GoTo, Velocity

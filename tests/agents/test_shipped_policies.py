@@ -11,7 +11,7 @@ from uas_coverage_agents.training.score import MEASURES, fly
 from uas_coverage_agents.velocity.planner import SHIPPED, LearnedVelocity
 
 from uas_coverage_env import load_planner, rollout
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env.flight.metrics import accomplished
 
 
 def test_learned_velocity_is_a_planner_with_both_assistants():

@@ -20,9 +20,11 @@ from uas_coverage_agents.waypoint.observation import NO_TARGET, observe
 from waypoint_missions import town
 from waypoint_oracle import Mission, observation
 
-from uas_coverage_env.simulation import initial_state
-from uas_coverage_env.vehicle import DOD, VX, VZ
-from uas_coverage_env.world import HOME, LANDED, build_arena
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.entities.state import LANDED
+from uas_coverage_env.simulation.world import initial_state
+from uas_coverage_env.vehicle.layout import DOD, VX, VZ
+from uas_coverage_env.world import build_arena
 
 SCENARIOS = [
     town(1, n_uas=1, n_waypoints=5),

@@ -7,7 +7,7 @@ import pytest
 from uas_coverage_agents.policy.pointer import Pointer
 from uas_coverage_agents.waypoint.layout import OBSERVATION_SIZE, K
 from uas_coverage_agents.waypoint.policy_runner import WaypointRunner, network, observation
-from uas_coverage_agents.waypoint.scorer import score, weights_of
+from uas_coverage_agents.waypoint.scorer import scorer_weights, write_scores
 from uas_coverage_agents.waypoint.sub_environments import (
     begin_lanes,
     make_lanes,
@@ -18,8 +18,9 @@ from uas_coverage_agents.waypoint.team import ENERGY, LEFT, NO_UAS, TIME
 from waypoint_missions import PRIOR, tensors, town, with_something_parked
 
 from uas_coverage_env import rollout
-from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.flight import Assistants, coverage, energy_Wh, home
+from uas_coverage_env.autopilot.assist import assistants
+from uas_coverage_env.flight import Assistants
+from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.simulation.pool import pool_worlds
 
 BOTH = Assistants(return_mode=True, safety_filter=True)
@@ -71,7 +72,7 @@ def test_the_compiled_network_is_the_network_of_the_policy_file():
     each[:, 0] = 1.0
     each[7:] = 0.0
     scores = np.empty(K + 1)
-    score(weights_of(pointer, weights), row, scores)
+    write_scores(scorer_weights(pointer, weights), row, scores)
     expected = pointer.forward(weights, row)
     assert scores[:7] == pytest.approx(expected[:7], rel=1e-9)
     assert (scores[7:K] == -np.inf).all()

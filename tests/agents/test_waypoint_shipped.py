@@ -9,7 +9,7 @@ from uas_coverage_agents.waypoint.planner import SHIPPED, LearnedWaypoint
 
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import coverage, energy_Wh, home
+from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 
 
 def test_the_shipped_policy_covers_the_village_and_saves_energy_and_time():

@@ -32,11 +32,11 @@ from uas_coverage_agents.waypoint.team import (
 )
 from waypoint_missions import town, with_something_parked
 
-from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.mission import find_blocked
-from uas_coverage_env.simulation import initial_state
+from uas_coverage_env.autopilot.assist import assistants
+from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.simulation.pool import pool_worlds
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.simulation.world import initial_state
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import build_arena
 
 SCENARIOS = [

@@ -1,13 +1,9 @@
 """Policies small enough to write down, and what they are made of."""
 
 import numpy as np
-from uas_coverage_agents.policy import (
-    Mlp,
-    PolicyDescription,
-    ScenarioFamily,
-    Training,
-    save_policy,
-)
+from uas_coverage_agents.policy import PolicyDescription, save_policy
+from uas_coverage_agents.policy.description import ScenarioFamily, Training
+from uas_coverage_agents.policy.mlp import Mlp
 from uas_coverage_agents.velocity.policy_runner import observation
 
 

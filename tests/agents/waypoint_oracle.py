@@ -9,9 +9,11 @@ import math
 import numpy as np
 from uas_coverage_agents.waypoint.layout import CRUISE_SHARE, K
 
-from uas_coverage_env.autopilot import path_length_home_m
-from uas_coverage_env.vehicle import DOD, VX, VY, X, Y, Z
-from uas_coverage_env.world import FLYING, HOME, route
+from uas_coverage_env.autopilot.guidance import path_length_home_m
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.vehicle.layout import DOD, VX, VY, X, Y, Z
+from uas_coverage_env.world.routes import route
 
 CLOCK_RESERVE_S, LANDING_S, LEAD_S, TURN_MPS2 = 18.0, 6.0, 1.6, 3.0
 

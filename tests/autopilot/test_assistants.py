@@ -8,23 +8,18 @@ import pytest
 from numba import njit
 from numba.core.errors import TypingError
 
-from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.autopilot.assist import assist
+from uas_coverage_env.autopilot.assist import assist, assistants
 from uas_coverage_env.autopilot.guidance import steer
 from uas_coverage_env.autopilot.return_mode import call_home
 from uas_coverage_env.autopilot.safety import filter_commands
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, GO_TO, VELOCITY
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.simulation import World, advance, initial_state
+from uas_coverage_env.simulation import World
 from uas_coverage_env.simulation.flight import fly_still
-from uas_coverage_env.simulation.step import begin_step, judge
-from uas_coverage_env.world import (
-    COMMAND_DTYPE,
-    GO_TO,
-    OUTCOME_DTYPE,
-    VELOCITY,
-    WorldState,
-    build_arena,
-)
+from uas_coverage_env.simulation.step import advance, begin_step, judge
+from uas_coverage_env.simulation.world import initial_state
+from uas_coverage_env.world import WorldState, build_arena
 
 SCENARIO = generate_scenario(3, n_uas=3, n_waypoints=20, n_obstacles=10)
 

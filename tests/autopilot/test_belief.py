@@ -8,22 +8,15 @@ import pytest
 from small_worlds import meadow
 
 from uas_coverage_env import load_scenario, rollout
-from uas_coverage_env.autopilot import seconds_to_keep
 from uas_coverage_env.autopilot.belief import learn, speed_along
+from uas_coverage_env.autopilot.return_mode import seconds_to_keep
+from uas_coverage_env.entities.state import CONSUMPTION, LANDED, N_BELIEF, WIND
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.flight.record import LANDED as FLIGHT_LANDED
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX, VY, VZ
-from uas_coverage_env.world import (
-    CONSUMPTION,
-    LANDED,
-    N_BELIEF,
-    WIND,
-    Acceleration,
-    GoTo,
-    Velocity,
-)
+from uas_coverage_env.vehicle.layout import DOD, VX, VY, VZ
+from uas_coverage_env.world import Acceleration, GoTo, Velocity
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot import path_length_home_m, seconds_home
+from uas_coverage_env.autopilot.guidance import path_length_home_m
+from uas_coverage_env.autopilot.return_mode import seconds_home
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VX, VY, VZ, X, Y, Z
-from uas_coverage_env.world import FLYING, LANDED, GoTo, Velocity
+from uas_coverage_env.vehicle.layout import VX, VY, VZ, X, Y, Z
+from uas_coverage_env.world import GoTo, Velocity
 
 
 def visit(world, orders, max_steps=600):

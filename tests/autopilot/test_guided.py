@@ -2,11 +2,10 @@ import numpy as np
 import pytest
 
 from uas_coverage_env import GoTo, World, load_scenario
-from uas_coverage_env.autopilot import velocity_of
-from uas_coverage_env.autopilot.guidance import steer
+from uas_coverage_env.autopilot.guidance import steer, velocity_of
+from uas_coverage_env.entities.commands import CLIMB, GO_TO
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
-from uas_coverage_env.vehicle import VX, VZ
-from uas_coverage_env.world import CLIMB, GO_TO
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 
 @pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])

@@ -5,11 +5,11 @@ from small_worlds import box, meadow
 
 from uas_coverage_env import World, load_planner, rollout
 from uas_coverage_env.autopilot.low_altitude_return import LITTLE_MPS, low_way
-from uas_coverage_env.entities.state import WIND
+from uas_coverage_env.entities.state import FLYING, LANDED, WIND
 from uas_coverage_env.features.wind import Wind
-from uas_coverage_env.flight import home
+from uas_coverage_env.flight.metrics import home
 from uas_coverage_env.scenario import sample_scenario
-from uas_coverage_env.world import FLYING, LANDED, GoTo
+from uas_coverage_env.world import GoTo
 
 AWAY_M = (60.0, 100.0, -30.0)
 BLOCK = box("block", (100.0, 70.0, -11.0), (125.0, 125.0, 0.0))

@@ -8,9 +8,10 @@ from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env import load_scenario, rollout
 from uas_coverage_env.autopilot.exit_overhang import way_out
+from uas_coverage_env.entities.state import LANDED
 from uas_coverage_env.flight.record import LANDED as FLIGHT_LANDED
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import LANDED, GoTo
+from uas_coverage_env.world import GoTo
 from uas_coverage_env.world.overhangs import is_below_overhang
 
 SLAB = box("slab", (80.0, 120.0, -14.0), (120.0, 150.0, -10.0))

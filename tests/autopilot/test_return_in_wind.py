@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot import has_to_return
+from uas_coverage_env.autopilot.return_mode import has_to_return
+from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.features.wind import Gust, Wind
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.scenario import sample_scenario, with_disturbances
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, X, Y
-from uas_coverage_env.world import LANDED, LOST, GoTo, Velocity
+from uas_coverage_env.vehicle.layout import DOD, X, Y
+from uas_coverage_env.world import GoTo, Velocity
 
 FAR = (waypoint((190.0, 100.0, -20.0), 5.0),)
 

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot import seconds_home, seconds_to_keep
+from uas_coverage_env.autopilot.return_mode import seconds_home, seconds_to_keep
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX
-from uas_coverage_env.world import FLYING, LANDED, GoTo, Velocity
+from uas_coverage_env.vehicle.layout import DOD, VX
+from uas_coverage_env.world import GoTo, Velocity
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from uas_coverage_env.entities.state import LANDED
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX, VY, load_vehicle
-from uas_coverage_env.world import LANDED, GoTo
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import DOD, VX, VY
+from uas_coverage_env.world import GoTo
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 

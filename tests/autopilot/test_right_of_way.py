@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env.autopilot.right_of_way import decision_order
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import X, Y, Z
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, KIND_NAMES, LANDED
+from uas_coverage_env.vehicle.layout import X, Y, Z
 
 VELOCITY = KIND_NAMES.index("velocity")
 HOME_M = (100.0, 60.0, -1.0)

@@ -2,18 +2,13 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, mover
 
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.entities.state import LANDED
 from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VX, VY, X, Y
-from uas_coverage_env.world import (
-    COMMAND_DTYPE,
-    CONTACT_NAMES,
-    KIND_NAMES,
-    LANDED,
-    Acceleration,
-    Velocity,
-    Wrench,
-)
+from uas_coverage_env.vehicle.layout import VX, VY, X, Y
+from uas_coverage_env.world import Acceleration, Velocity, Wrench
 
 VELOCITY, ACCELERATION, WRENCH = map(KIND_NAMES.index, ("velocity", "acceleration", "wrench"))
 

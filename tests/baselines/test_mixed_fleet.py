@@ -11,7 +11,7 @@ from uas_coverage_baselines.trajectory.planner import Trajectory, TrajectoryOpti
 
 from uas_coverage_env import load_scenario, rollout
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env.flight.metrics import accomplished
 
 PLANNERS = {
     "nearest-waypoint": NearestWaypoint,

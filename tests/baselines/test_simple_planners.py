@@ -12,7 +12,8 @@ from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
 
 from uas_coverage_env.files.strict_toml import parse
-from uas_coverage_env.flight import Assistants, AssistedOptions, accomplished, rollout
+from uas_coverage_env.flight import Assistants, AssistedOptions, rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, generate_scenario, load_scenario
 from uas_coverage_env.simulation import World

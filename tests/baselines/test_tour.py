@@ -7,12 +7,14 @@ from uas_coverage_baselines.tour import Tour, TourOptions
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
 from uas_coverage_env import load_scenario, rollout
-from uas_coverage_env.flight import Assistants, accomplished, coverage, home
+from uas_coverage_env.entities.state import LOST
+from uas_coverage_env.flight import Assistants
+from uas_coverage_env.flight.metrics import accomplished, coverage, home
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, Wind, generate_scenario, sample_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import LOST, GoTo, Velocity, build_arena
+from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.world import GoTo, Velocity, build_arena
 
 QUICK = {"moves": 20_000, "changes": 60}
 

@@ -9,7 +9,7 @@ from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
 from uas_coverage_env import rollout
 from uas_coverage_env.bound import MissionBound, bound_of
-from uas_coverage_env.flight import accomplished, energy_Wh
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh
 
 HOME = (20.0, 20.0, -1.0)
 OTHER_HOME = (60.0, 20.0, -1.0)

@@ -11,8 +11,7 @@ from uas_coverage_env import rollout
 from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.bound.passing import Half, Passages, Passing, at_least, exactly, some
 from uas_coverage_env.bound.program import least_routes
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY
-from uas_coverage_env.vehicle.layout import WX, WY
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY, WX, WY
 
 HOME = (20.0, 20.0, -1.0)
 PLACES = [

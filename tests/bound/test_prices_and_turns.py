@@ -11,8 +11,9 @@ from uas_coverage_env import rollout
 from uas_coverage_env.bound.prices import STEPS, WITHIN, Ends, Prices, cheapest, energy_prices
 from uas_coverage_env.bound.program import Cut, least_routes
 from uas_coverage_env.bound.turning import LONGEST, turning_of_fleet
-from uas_coverage_env.flight import energy_Wh
-from uas_coverage_env.vehicle import PHI, THETA, VX, VY, load_vehicle
+from uas_coverage_env.flight.metrics import energy_Wh
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY
 
 HOME = (20.0, 20.0, -1.0)
 CORNERS = ((400.0, 60.0, -10.0), (440.0, 420.0, -30.0), (90.0, 460.0, -6.0), (200.0, 220.0, -18.0))

@@ -100,7 +100,7 @@ def test_options_seed_dynamics_and_filter_reach_the_flight(capsys):
     assert "the safety filter replaced 0.0% of the commands" in capsys.readouterr().out
 
 
-def test_ctrl_c_keeps_the_flight_and_fails_the_mission(elsewhere, monkeypatch, capsys):
+def test_ctrl_c_keeps_the_flight_and_is_told_by_the_exit_code(elsewhere, monkeypatch, capsys):
     from uas_coverage_baselines.hover import Hover
 
     act = Hover.act
@@ -111,7 +111,7 @@ def test_ctrl_c_keeps_the_flight_and_fails_the_mission(elsewhere, monkeypatch, c
         return act(planner, swarm)
 
     monkeypatch.setattr(Hover, "act", interrupted)
-    assert main(["run", "village", "--planner", "hover", "--out", "mine"]) == 1
+    assert main(["run", "village", "--planner", "hover", "--out", "mine"]) == 130
     assert Flight.load("mine").steps == 3
     assert "in 3 steps, stopped;" in capsys.readouterr().out
 
@@ -127,7 +127,7 @@ def test_a_planner_that_gives_nonsense_fails_in_one_line(elsewhere, monkeypatch,
 
 
 def test_the_shipped_scenarios_are_listed(capsys):
-    assert main(["scenarios"]) == 0
+    assert main(["scenario", "list"]) == 0
     out = capsys.readouterr().out
     assert set(scenario_names()) <= set(out.split())
     assert "500 x 500 x 50" in out
@@ -135,7 +135,7 @@ def test_the_shipped_scenarios_are_listed(capsys):
 
 def test_a_check_describes_and_draws_a_scenario(elsewhere, capsys):
     path = village(elsewhere)
-    assert main(["scenarios", "check", str(path)]) == 0
+    assert main(["scenario", "check", str(path)]) == 0
     out = capsys.readouterr().out
     assert "village is valid" in out
     assert "49, sum of weights" in out
@@ -144,7 +144,7 @@ def test_a_check_describes_and_draws_a_scenario(elsewhere, capsys):
 
 
 def test_a_check_says_what_waypoints_ask_for_and_which_uas_carry_it(elsewhere, capsys):
-    assert main(["scenarios", "check", "mixed_fleet"]) == 0
+    assert main(["scenario", "check", "mixed_fleet"]) == 0
     out = capsys.readouterr().out
     assert "15 for camera: mapper" in out
     assert "usable to 25%, carries thermal, gas" in out
@@ -153,43 +153,64 @@ def test_a_check_says_what_waypoints_ask_for_and_which_uas_carry_it(elsewhere, c
 def test_a_check_replaces_a_picture_only_where_it_was_asked_to(elsewhere, capsys):
     picture = elsewhere / "drawn.png"
     picture.write_bytes(b"precious")
-    command = ["scenarios", "check", "village", "--picture", "drawn.png"]
+    command = ["scenario", "check", "village", "--picture", "drawn.png"]
     assert main(command) == 2
     assert picture.read_bytes() == b"precious"
     assert main([*command, "--overwrite"]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert main(["scenarios", "check", "village", "--picture", "no/such/folder.png"]) == 2
+    assert main(["scenario", "check", "village", "--picture", "no/such/folder.png"]) == 2
     assert capsys.readouterr().err.count("\n") == 2
 
 
 def test_a_check_may_be_repeated(elsewhere, capsys):
     for _ in range(2):
-        assert main(["scenarios", "check", "open_field"]) == 0
+        assert main(["scenario", "check", "open_field"]) == 0
     picture = elsewhere / "open_field.png"
     drawn = picture.read_bytes()
     # a picture of somebody else is left alone, also where it is a good one
     Image.open(picture).copy().save(picture)
-    assert main(["scenarios", "check", "open_field"]) == 2
+    assert main(["scenario", "check", "open_field"]) == 2
     assert "add --overwrite" in capsys.readouterr().err
     assert picture.read_bytes() != drawn
 
 
 def test_a_mission_that_its_batteries_cannot_finish_is_valid_with_a_warning(elsewhere, capsys):
     path = village(elsewhere, **{"soc_0 = 1.0": "soc_0 = 0.27", "soc_0 = 0.433": "soc_0 = 0.27"})
-    assert main(["scenarios", "check", str(path)]) == 0
+    assert main(["scenario", "check", str(path)]) == 0
     err = capsys.readouterr().err
     assert err.startswith("warning: ")
     assert err.count("\n") == 1
 
 
 def test_the_planners_are_listed_with_their_options(capsys):
-    assert main(["planners"]) == 0
+    assert main(["planner", "list"]) == 0
     out = capsys.readouterr().out
     for words in ("hover", "climb_m", "default 5.0", "random-walk", "hold_s", "true|false"):
         assert words in out
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["scenarios"], ["scenarios", "check"]])
+def test_planners_are_listed_for_machines(capsys):
+    assert main(["planner", "list", "--json"]) == 0
+    listed = {planner["name"]: planner for planner in json.loads(capsys.readouterr().out)}
+    assert {"hover", "milp-mpc", "trajectory"} <= listed.keys()
+    (climb,) = (one for one in listed["hover"]["options"] if one["name"] == "climb_m")
+    assert (climb["default"], climb["values"]) == ("5.0", "float")
+    assert main(["planner", "list", "tour", "--json"]) == 0
+    assert [one["name"] for one in json.loads(capsys.readouterr().out)] == ["tour"]
+
+
+def test_a_new_scenario_begins_as_one_that_there_is(elsewhere, capsys):
+    assert main(["scenario", "new", "town:7", "--out", "my town.toml"]) == 0
+    made = load_scenario(elsewhere / "my town.toml")
+    assert made == load_scenario("town:7").model_copy(update={"name": "my_town"})
+    assert main(["scenario", "new", "village", "--out", "my town.toml"]) == 2
+    assert "my town.toml: exists; give another file or add --overwrite" in capsys.readouterr().err
+    assert main(["scenario", "new", "village", "--out", "my town.toml", "--overwrite"]) == 0
+    assert main(["scenario", "new", "village", "--out", "mine.json"]) == 2
+    assert "mine.json: should end in .toml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [[], ["run"], ["scenario"], ["scenario", "check"], ["planner"]])
 def test_every_command_has_help(command, capsys):
     assert main([*command, "--help"]) == 0
     assert "Usage: uas-coverage" in capsys.readouterr().out
@@ -197,7 +218,7 @@ def test_every_command_has_help(command, capsys):
 
 def test_no_command_at_all_is_answered_with_help(capsys):
     assert main([]) == 0
-    assert "planners" in capsys.readouterr().out
+    assert "planner" in capsys.readouterr().out
 
 
 def test_the_planner_of_the_paper_flies_by_default_and_leaves_its_predictions(elsewhere):
@@ -374,7 +395,7 @@ def test_a_flight_directory_of_somebody_else_overwrites_nothing_outside(elsewher
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes and devices of POSIX")
-@pytest.mark.parametrize("command", ["run", "scenarios check"])
+@pytest.mark.parametrize("command", ["run", "scenario check"])
 def test_a_scenario_that_is_a_pipe_or_a_device_is_refused(elsewhere, capsys, command):
     os.mkfifo(elsewhere / "pipe.toml")
     (elsewhere / "zeros.toml").symlink_to("/dev/zero")

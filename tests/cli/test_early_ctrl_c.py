@@ -54,7 +54,7 @@ def interrupted(folder, name, command):
     "name", ["lazy_loader", "numpy", "gymnasium.core", "pettingzoo", "typer", "rich.console"]
 )
 def test_ctrl_c_while_the_program_is_imported_ends_it_without_a_word(tmp_path, name, form):
-    ended = interrupted(tmp_path, name, [*FORMS[form], "planners"])
+    ended = interrupted(tmp_path, name, [*FORMS[form], "planner", "list"])
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
 
 
@@ -66,7 +66,7 @@ def test_ctrl_c_while_another_program_imports_the_package_is_python_s_own(tmp_pa
 
 def test_ctrl_c_while_a_command_is_imported_is_one_line(tmp_path):
     ended = interrupted(
-        tmp_path, "uas_coverage_env.cli.planners", [*FORMS["installed"], "planners"]
+        tmp_path, "uas_coverage_env.cli.planner", [*FORMS["installed"], "planner", "list"]
     )
-    assert ended.returncode == 1
+    assert ended.returncode == 130
     assert ended.stderr == "error: stopped by hand; what was finished before is kept\n"

@@ -64,7 +64,7 @@ def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
     line = refused(capsys, "run", str(path), "--planner", "hover")
     assert word in line
     assert "mine.toml" in line
-    assert refused(capsys, "scenarios", "check", str(path)) == line
+    assert refused(capsys, "scenario", "check", str(path)) == line
     assert [entry.name for entry in elsewhere.iterdir()] == ["mine.toml"]
 
 
@@ -75,7 +75,7 @@ def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
         (["export", "flown", "--out", "plans"], "--format': qgc (.plan)"),
         (["run", "atlantis"], "atlantis"),
         (["run", "no/such/file.toml"], "no/such/file.toml"),
-        (["scenarios", "check", "no/such/file.toml"], "no/such/file.toml"),
+        (["scenario", "check", "no/such/file.toml"], "no/such/file.toml"),
         (["run", "."], "."),
         (["run", "village", "--planner", "teleport"], "teleport"),
         (["run", "village", "--planner", "hover", "--option", "climb=3"], "climb_m"),
@@ -94,12 +94,19 @@ def test_a_mistake_in_a_scenario_is_named(mistake, elsewhere, capsys):
         (["run", "village", "--steps", "many"], "--steps"),
         (["run", "village", "--seed", "-1"], "--seed"),
         (["run", "village", "--seed", str(SEEDS)], "--seed"),
-        (["front", "village", "--seed", str(SEEDS), "--out", "front"], "--seed"),
+        (["planner", "demonstrate", "village", "--seed", str(SEEDS), "--out", "shown"], "--seed"),
+        (
+            [
+                *("compare", "--scenarios", "village", "--planners", "hover"),
+                *("--vary", "climb=3,4", "--out", "front"),
+            ],
+            "'climb'; did you mean climb_m?",
+        ),
         (["train", "ppo", "--seed", str(2**32)], "--seed"),
         (["run", "village", "--speed", "9"], "--speed"),
         (["run"], "SCENARIO"),
         (["fly", "village"], "fly"),
-        (["scenarios", "chek", "village"], "chek"),
+        (["scenario", "chek", "village"], "chek"),
         (["run", "village", "--planner", "hover", "--out", "taken"], "taken"),
         (["run", "village", "--planner", "hover", "--out", "taken/note"], "taken/note"),
         (["run", "village", "--planner", "hover", "--out", "taken/note/deeper"], "deeper"),
@@ -122,7 +129,7 @@ LONG = "n" * 300
         ["run", "village", "--planner", "hover", "--out", LONG],
         ["run", f"{LONG}.toml"],
         ["run", "village", "--planner", f"policy:{LONG}"],
-        ["scenarios", "check", "village", "--picture", f"{LONG}.png"],
+        ["scenario", "check", "village", "--picture", f"{LONG}.png"],
         ["compare", "--scenarios", "village", "--planners", "hover", "--out", LONG],
         ["compare", "--scenarios", f"{LONG}.toml", "--planners", "hover", "--out", "here"],
         ["compare", "--scenarios", LONG, "--planners", "hover", "--out", "here"],
@@ -154,7 +161,7 @@ def test_a_terminal_that_is_full_or_gone_is_one_line(elsewhere, capsys, monkeypa
             raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(sys, "stdout", Full())
-    assert main(["planners"]) == 2
+    assert main(["planner", "list"]) == 2
     monkeypatch.undo()
     err = capsys.readouterr().err
     assert err.startswith("error: ")
@@ -167,7 +174,7 @@ def test_a_name_that_the_terminal_cannot_show_is_shown_as_it_can(elsewhere, monk
     terminal = io.BytesIO()
     stream = io.TextIOWrapper(terminal, encoding="ascii", errors=errors)
     monkeypatch.setattr(sys, "stdout", stream)
-    assert main(["scenarios", "check", "village", "--picture", "dörfer.png"]) == 0
+    assert main(["scenario", "check", "village", "--picture", "dörfer.png"]) == 0
     sys.stdout.flush()
     assert b"drawn in d\\xf6rfer.png" in terminal.getvalue()
 

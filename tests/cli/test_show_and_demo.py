@@ -10,7 +10,9 @@ from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.cli import demo as demo_command
 from uas_coverage_env.cli import main
 from uas_coverage_env.cli.figures_of_flight import verdict
-from uas_coverage_env.flight import Flight, accomplished, load_planner, rollout, summary
+from uas_coverage_env.flight import Flight, load_planner, rollout
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import generate_scenario
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

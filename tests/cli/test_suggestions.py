@@ -9,6 +9,7 @@ import pytest
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.suggestions import did_you_mean
+from uas_coverage_env.tasks import LEVELS
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -17,13 +18,10 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
     ("words", "answer"),
     [
         (["run", "vilage"], "unknown scenario 'vilage'; did you mean village?"),
-        (["scenarios", "check", "Village"], "did you mean village?"),
+        (["scenario", "check", "Village"], "did you mean village?"),
         (["run", "generatd:5"], "did you mean generated:5?"),
         (["run", "twon:5"], "did you mean town:5?"),
-        (
-            ["figure", ".", "--kind", "maps"],
-            "Invalid value for '--kind': 'maps' is not one of 'map'",
-        ),
+        (["figure", ".", "--kind", "maps"], "--kind 'maps': did you mean map?"),
         (
             ["run", "village", "--seed", "-1"],
             "Invalid value for '--seed': '-1' should be greater than or equal to 0",
@@ -34,12 +32,12 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
         (["score", "--level", "eays", "--out", "o"], "--level 'eays': did you mean easy?"),
         (["run", "village", "--planner", "nearst-waypoint"], "did you mean nearest-waypoint?"),
         (["run", "village", "--planner", "polisy:mine"], "did you mean policy:mine?"),
-        (["planners", "lawn-mower"], "did you mean lawnmower?"),
+        (["planner", "list", "lawn-mower"], "did you mean lawnmower?"),
         (["run", "village", "--planner", "tour", "--option", "move=3"], "did you mean moves?"),
         (["run", "village", "--planer", "tour"], "Did you mean '--planner'?"),
         (["vehicle", "check", "S500V2"], "did you mean s500_v2?"),
-        (["scenarios", "chek", "village"], "Did you mean 'check'?"),
-        (["scenarios", "show", "village"], "No such command 'show'. Take list, check."),
+        (["scenario", "chek", "village"], "Did you mean 'check'?"),
+        (["scenario", "show", "village"], "No such command 'show'. Take list, check, new, resume."),
         (["fly", "village"], "No such command 'fly'. See `uas-coverage --help`."),
     ],
 )
@@ -76,11 +74,11 @@ def test_a_generated_scenario_is_checked_and_flown_by_its_name(elsewhere, capsys
     words = ["run", "generated:3", "--planner", "hover", "--steps", "1", "--out", "mine"]
     assert main(words) == 0
     assert Flight.load("mine").scenario == sample_scenario(3)
-    assert main(["scenarios", "check", "generated:3"]) == 0
+    assert main(["scenario", "check", "generated:3"]) == 0
     assert (elsewhere / f"{sample_scenario(3).name}.png").exists()
 
 
-@pytest.mark.parametrize("words", [[], ["run"], ["scenarios"], ["vehicle", "new"]])
+@pytest.mark.parametrize("words", [[], ["run"], ["scenario", "list"], ["vehicle", "new"]])
 def test_a_flag_takes_no_value_and_is_shown_with_none(words, capsys):
     assert main([*words, "--help"]) == 0
     out = capsys.readouterr().out
@@ -121,23 +119,20 @@ def test_the_script_for_a_shell_is_printed():
 
 
 def test_one_planner_is_described_at_length(capsys):
-    assert main(["planners", "tour"]) == 0
+    assert main(["planner", "list", "tour"]) == 0
     out = capsys.readouterr().out
     assert "Before take-off" in out, "more than the line of the list"
     assert "moves" in out
     assert "2000000" in out
     assert "changes tried by the order search" in out
     assert "nearest-waypoint" not in out
-    assert main(["planners", "policy"]) == 0
+    assert main(["planner", "list", "policy"]) == 0
     assert "policy:DIR" in capsys.readouterr().out
 
 
-def test_vehicles_and_scenarios_are_listed_by_either_name(capsys):
-    listed = []
-    for words in (["vehicle"], ["vehicles"], ["scenarios"], ["scenarios", "list"]):
-        assert main(words) == 0
-        listed.append(capsys.readouterr().out)
-    assert listed[0] == listed[1]
-    assert listed[2] == listed[3]
-    assert "s500_v2" in listed[0]
-    assert "generated:SEED" in listed[2]
+def test_scenarios_are_listed_with_what_draws_others_and_the_levels(capsys):
+    assert main(["scenario", "list"]) == 0
+    listed = capsys.readouterr().out
+    assert "village" in listed
+    assert "generated:SEED" in listed
+    assert all(f"level {level}: {task.meaning}" in listed for level, task in LEVELS.items())

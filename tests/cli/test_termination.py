@@ -5,6 +5,7 @@ import io
 import json
 import os
 import signal
+import subprocess
 import sys
 from contextlib import contextmanager
 from functools import partial
@@ -44,7 +45,7 @@ def test_a_scheduler_or_a_lost_terminal_ends_a_flight_as_ctrl_c_does_and_what_wa
     before = signal.signal(number, signal.SIG_DFL)  # tests may run under nohup themselves
     monkeypatch.setattr(run, "shown", lambda *_, **__: ending(number))
     try:
-        assert main(["run", "open_field", "--planner", "hover", "--out", "mine"]) == 1
+        assert main(["run", "open_field", "--planner", "hover", "--out", "mine"]) == 128 + number
     finally:
         after = signal.signal(number, before)
     flight = Flight.load("mine")
@@ -118,7 +119,7 @@ def test_ctrl_c_during_the_report_does_not_say_that_nothing_was_kept(
     elsewhere, monkeypatch, capsys
 ):
     monkeypatch.setattr(run, "report_flight", lambda *_: signal.raise_signal(signal.SIGINT))
-    assert main(["run", "open_field", "--planner", "hover", "--steps", "2", "--out", "mine"]) == 1
+    assert main(["run", "open_field", "--planner", "hover", "--steps", "2", "--out", "mine"]) == 130
     assert Flight.load("mine").steps == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == "error: stopped by hand; what was finished before is kept"
@@ -128,7 +129,7 @@ def test_ctrl_c_during_the_report_does_not_say_that_nothing_was_kept(
 @pytest.mark.parametrize("when", ["command_group", "_never_stop_at_a_letter"])
 def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
     monkeypatch.setattr(app, when, lambda: signal.raise_signal(signal.SIGINT))
-    assert main(["planners"]) == 1
+    assert main(["planner", "list"]) == 130
     said = capsys.readouterr().err
     assert said == "error: stopped by hand; what was finished before is kept\n"
 
@@ -136,7 +137,7 @@ def test_ctrl_c_before_a_command_begins_is_one_line(monkeypatch, capsys, when):
 def test_an_error_without_an_interruption_is_none_of_these(monkeypatch):
     monkeypatch.setattr(app, "command_group", partial(json.loads, "a mistake of ours"))
     with pytest.raises(json.JSONDecodeError):
-        main(["planners"])
+        main(["planner", "list"])
 
 
 @pytest.mark.usefixtures("python_handles_interrupts")
@@ -148,12 +149,13 @@ def test_an_interruption_that_a_library_turns_into_an_error_is_one_line(monkeypa
             raise TypeError("cannot compare") from interruption
 
     monkeypatch.setattr(app, "command_group", compare)
-    assert main(["planners"]) == 1
+    assert main(["planner", "list"]) == 130
     assert capsys.readouterr().err == "error: stopped by hand (TypeError)\n"
 
 
 STOPPED = """
 import signal
+import subprocess
 
 from uas_coverage_env.flight import load_planner
 
@@ -175,7 +177,32 @@ def test_a_mission_that_is_stopped_by_hand_is_not_scored(elsewhere, monkeypatch,
     (elsewhere / "stopped_planner.py").write_text(STOPPED)
     monkeypatch.syspath_prepend(elsewhere)
     asked = ["score", "--planners", "stopped_planner:Stopped", "--jobs", "1", "--out", "kept"]
-    assert main(asked) == main(asked) == 1
+    assert main(asked) == main(asked) == 143
     assert flights_in("kept") == []
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == "error: stopped by hand; what was finished before is kept"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_process_that_is_stopped_keeps_the_flight_and_tells_the_signal(elsewhere, name):
+    number = getattr(signal, name)
+    command = ["run", "open_field", "--planner", "hover", "--out", "mine"]
+    started = subprocess.Popen(
+        [sys.executable, "-m", "uas_coverage_env", *command],
+        # as a shell starts it, also where the tests run in the background or under nohup
+        preexec_fn=lambda: (
+            signal.signal(signal.SIGINT, signal.default_int_handler),
+            signal.signal(signal.SIGHUP, signal.SIG_DFL),
+        ),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert started.stdout is not None
+    assert started.stdout.readline().startswith("step 0/")
+    started.send_signal(number)
+    _, said = started.communicate()
+    assert started.returncode == 128 + number
+    assert said.splitlines()[-1] == "error: stopped by hand; what was finished before is kept"
+    assert Flight.load("mine").ended == "stopped"

@@ -175,5 +175,5 @@ def test_a_second_ctrl_c_that_comes_out_of_a_planner_as_an_error_is_no_error_of_
             raise TypeError("cannot compare") from interruption
 
     monkeypatch.setattr(Hover, "act", swallows)
-    said = said_of(capsys, *run("hover"), code=1)
+    said = said_of(capsys, *run("hover"), code=130)
     assert said == "error: stopped by hand (PlannerError)"

@@ -27,9 +27,8 @@ def new(*more, **changes):
     return ["vehicle", "new", *(word for pair in known.items() for word in pair), *more]
 
 
-@pytest.mark.parametrize("command", [["vehicle"], ["vehicle", "list"]])
-def test_the_shipped_vehicles_are_listed_with_their_hover_time(command, capsys):
-    assert main(command) == 0
+def test_the_shipped_vehicles_are_listed_with_their_hover_time(capsys):
+    assert main(["vehicle", "list"]) == 0
     out = capsys.readouterr().out
     for name in vehicle_names():
         assert re.search(rf"^ *{name} .*\d", out, re.MULTILINE)
@@ -82,7 +81,7 @@ def test_a_file_that_exists_is_kept_unless_told(elsewhere, capsys):
     (elsewhere / "mine.toml").write_text("precious")
     assert main(new("--out", "mine.toml")) == 2
     assert capsys.readouterr().err == (
-        "error: mine.toml: exists; give another --out or add --overwrite\n"
+        "error: mine.toml: exists; give another file or add --overwrite\n"
     )
     assert (elsewhere / "mine.toml").read_text() == "precious"
     assert main(new("--out", "mine.toml", "--overwrite")) == 0
@@ -105,7 +104,7 @@ def test_a_propeller_may_be_its_diameter_alone(capsys):
         ({"mass_kg": "heavy"}, "Invalid value for '--mass-kg'"),
         ({"propeller_in": "10-4.5"}, "--propeller-in '10-4.5': should be DIAMETERxPITCH"),
         ({"hover_minutes": "60"}, "hover_minutes 60 leaves"),
-        ({"out": "mine.txt"}, "--out mine.txt: should end in .toml"),
+        ({"out": "mine.txt"}, "mine.txt: should end in .toml"),
         ({"out": "nowhere/mine.toml"}, "nowhere/mine.toml: cannot be read or written"),
     ],
 )

@@ -39,18 +39,18 @@ def test_a_log_keeps_the_line_of_the_library():
 
 def test_after_a_warm_up_a_run_compiles_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["warm-up", "--planner", "nearest-waypoint"]) == 0
+    assert main(["planner", "warm-up", "--planner", "nearest-waypoint"]) == 0
     capsys.readouterr()
     n_compiled = COMPILATIONS.n_compiled
     assert main(["run", "open_field", "--planner", "nearest-waypoint", "--steps", "2"]) == 0
-    assert main(["warm-up", "--planner", "nearest-waypoint"]) == 0
+    assert main(["planner", "warm-up", "--planner", "nearest-waypoint"]) == 0
     assert COMPILATIONS.n_compiled == n_compiled
     assert "everything is compiled already: nearest-waypoint\n" in capsys.readouterr().out
 
 
 def test_a_warm_up_of_the_environments_leaves_them_nothing_to_compile(monkeypatch, capsys):
     monkeypatch.setattr(progress, "PATIENCE_S", 1e9)
-    assert main(["warm-up", "--planner", "hover", "--environments"]) == 0
+    assert main(["planner", "warm-up", "--planner", "hover", "--environments"]) == 0
     n_compiled = COMPILATIONS.n_compiled
     from uas_coverage_env import uas_coverage_v0
 
@@ -63,12 +63,12 @@ def test_a_warm_up_of_the_environments_leaves_them_nothing_to_compile(monkeypatc
 
 @pytest.mark.slow
 def test_a_warm_up_without_options_serves_the_first_commands_and_says_what_it_did(capsys):
-    assert main(["warm-up"]) == 0
+    assert main(["planner", "warm-up"]) == 0
     done, others = capsys.readouterr().out.splitlines()
     assert done.endswith(": nearest-waypoint, trajectory, milp-mpc, environments")
     assert "--planner NAME" in others
     n_compiled = COMPILATIONS.n_compiled
-    assert main(["warm-up", "--planner", "trajectory", "--environments"]) == 0
+    assert main(["planner", "warm-up", "--planner", "trajectory", "--environments"]) == 0
     assert COMPILATIONS.n_compiled == n_compiled
 
 
@@ -93,7 +93,7 @@ def test_a_run_says_once_for_what_it_compiles_and_a_quiet_one_nothing(
 
 
 def test_a_planner_that_is_not_known_is_refused(capsys):
-    assert main(["warm-up", "--planner", "nobody"]) == 2
+    assert main(["planner", "warm-up", "--planner", "nobody"]) == 2
     assert capsys.readouterr().err.startswith("error: ")
 
 
@@ -101,4 +101,4 @@ def test_a_planner_that_is_not_known_is_refused(capsys):
 @pytest.mark.parametrize("name", planner_names())
 def test_every_planner_can_be_warmed_up(name):
     assert load_planner(name)
-    assert main(["warm-up", "--planner", name]) == 0
+    assert main(["planner", "warm-up", "--planner", name]) == 0

@@ -16,7 +16,7 @@ def test_a_check_names_all_waypoints_without_a_way_to_them_and_says_what_closes_
     elsewhere, capsys
 ):
     yard().to_file(elsewhere / "yard.toml")
-    assert main(["scenarios", "check", "yard.toml"]) == 0
+    assert main(["scenario", "check", "yard.toml"]) == 0
     said = capsys.readouterr()
     assert "meadow is valid" in said.out
     assert said.err.startswith("warning: 1 of 3 waypoints have no way to them: waypoints[1]; ")
@@ -28,7 +28,7 @@ def test_of_many_waypoints_without_a_way_each_is_named(elsewhere, capsys):
     inside = [waypoint((115.0 + 6.0 * k, 130.0, -10.0), 2.0) for k in range(6)]
     places = [waypoint(OPEN[0]), *inside]
     meadow((HOME,), obstacles=ring(), waypoints=places).to_file(elsewhere / "many.toml")
-    assert main(["scenarios", "check", "many.toml"]) == 0
+    assert main(["scenario", "check", "many.toml"]) == 0
     err = capsys.readouterr().err
     assert err.startswith("warning: 6 of 7 waypoints have no way to them: ")
     assert re.findall(r"waypoints\[(\d)\]", err) == list("123456")
@@ -36,14 +36,14 @@ def test_of_many_waypoints_without_a_way_each_is_named(elsewhere, capsys):
 
 def test_a_check_says_nothing_of_ways_where_all_waypoints_have_one(elsewhere, capsys):
     yard(ring(gap_m=20.0)).to_file(elsewhere / "open.toml")
-    assert main(["scenarios", "check", "open.toml"]) == 0
+    assert main(["scenario", "check", "open.toml"]) == 0
     assert capsys.readouterr().err == ""
 
 
 def test_a_check_names_waypoints_that_no_charge_reaches(elsewhere, capsys):
     places = [waypoint((60.0, 30.0, -10.0)), waypoint((190.0, 190.0, -40.0))]
     meadow((HOME,), waypoints=places, soc_0=0.28).to_file(elsewhere / "weak.toml")
-    assert main(["scenarios", "check", "weak.toml"]) == 0
+    assert main(["scenario", "check", "weak.toml"]) == 0
     assert "charge     1 of 2 waypoints are out of reach: waypoints[1]; there and home takes" in (
         capsys.readouterr().out
     )

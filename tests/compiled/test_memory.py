@@ -17,7 +17,7 @@ from uas_coverage_env.compiled.views import (
     record_view,
     rows_view,
 )
-from uas_coverage_env.env.slots import Slots
+from uas_coverage_env.env.batch.slots import Slots
 
 S = TypeVar("S", bound=np.generic)
 NESTED = np.ndarray[tuple[Any, ...], np.dtype[S]]

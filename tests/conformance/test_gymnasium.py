@@ -7,7 +7,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import VectorEnv
 
 import uas_coverage_env  # noqa: F401  it registers the ids
-from uas_coverage_env.env import ACTION_NAMES, OBSERVATION_SIZE, CoverageSwarmEnv
+from uas_coverage_env.env import OBSERVATION_SIZE, CoverageSwarmEnv
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 
 ID = "UASCoverage-v0"
 

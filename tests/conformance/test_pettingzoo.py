@@ -8,7 +8,9 @@ import pettingzoo
 import pytest
 
 from uas_coverage_env import uas_coverage_v0
-from uas_coverage_env.env import ACTION_NAMES, PETTINGZOO_ID, CoverageParallelEnv
+from uas_coverage_env.env import CoverageParallelEnv
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
+from uas_coverage_env.registration import PETTINGZOO_ID
 from uas_coverage_env.scenario import generate_scenario
 
 with warnings.catch_warnings():
@@ -124,7 +126,7 @@ def test_metadata_says_what_learners_look_for():
     assert all(re.fullmatch("[a-z]+_[0-9]+", agent) for agent in env.possible_agents)
 
 
-def test_the_door_has_three_names():
-    assert uas_coverage_v0.__all__ == ["env", "parallel_env", "raw_env"]
+def test_the_door_has_four_names():
+    assert uas_coverage_v0.__all__ == ["env", "parallel_env", "raw_env", "vector_env"]
     raw = uas_coverage_v0.raw_env("open_field")
     assert isinstance(raw, pettingzoo.AECEnv)

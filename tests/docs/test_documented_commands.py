@@ -25,6 +25,7 @@ SHORTER = {
     "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
 }
 COMPARED = {"--scenarios": "open_field", "--planners": "nearest-waypoint", "--seeds": "0:1"}
+VARIED = {"--planners": "lawnmower", "--vary": "filter=true"}
 DONE, FAILED, REFUSED = 0, 1, 2
 
 
@@ -35,11 +36,9 @@ def shortened(words, filmed=False):
     if words[0] == "run" and "milp-mpc-paper" in words:
         limited = [SOON if word.startswith("time_limit_s=") else word for word in words]
         words = limited if SOON in limited else [*words, "--option", SOON]
-    if words[0] == "front":
-        one = ["open_field", "--planner", "lawnmower", "--vary", "filter=true"]
-        return ["front", *one, "--out", words[words.index("--out") + 1], *ALONE]
     if words[0] == "compare":
-        return [*(COMPARED.get(option, word) for option, word in pairwise(["", *words])), *ALONE]
+        instead = {**COMPARED, **(VARIED if "--vary" in words else {})}
+        return [*(instead.get(option, word) for option, word in pairwise(["", *words])), *ALONE]
     return [*words, *SHORTER.get(words[0], [])]
 
 

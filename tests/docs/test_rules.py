@@ -4,8 +4,8 @@ import re
 
 from markdown_blocks import ROOT
 
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.scenario.schema import scenario_schema
-from uas_coverage_env.world import CONTACT_NAMES
 
 PAGE = (ROOT / "docs" / "rules.md").read_text(encoding="utf-8")
 

@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.draw import Picture, legend, picture
+from uas_coverage_env.draw import Picture, picture
 from uas_coverage_env.draw.colours import UAS, of_charge
 from uas_coverage_env.draw.colours import of_words as of_words_
 from uas_coverage_env.draw.frame import Frame
-from uas_coverage_env.draw.signs import SIGNS, decoration_kinds, obstacle_kinds
+from uas_coverage_env.draw.signs import SIGNS, decoration_kinds, legend, obstacle_kinds
+from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.scenario import generate_scenario, load_scenario, scenario_names
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, PSI
-from uas_coverage_env.world import LANDED, LOST
+from uas_coverage_env.vehicle.layout import DOD, PSI
 
 
 @pytest.fixture(scope="module")

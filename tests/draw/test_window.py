@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from uas_coverage_env.draw import NoDisplayError, Window
+from uas_coverage_env.draw.window import NoDisplayError, Window
 
 pygame = pytest.importorskip("pygame")
 

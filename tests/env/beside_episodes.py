@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from uas_coverage_env.env.cuda import CudaMissions
-from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.memory import REWARD
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.episode import Episode
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.gpu.missions import CudaMissions
+from uas_coverage_env.env.report import REWARD
 from uas_coverage_env.mission import MissionBrief
 
 SEED, N_LANES = 7, 2
@@ -21,7 +21,7 @@ def compare(scenario, asked, n_steps, **settings):
         **settings: Of both.
     """
     missions = CudaMissions(N_LANES, scenario, seed=SEED, **settings)
-    episodes = [Episode(scenario, MissionSettings(**settings)) for _ in range(N_LANES)]
+    episodes = [Episode(scenario, MissionSettings.of(settings)) for _ in range(N_LANES)]
     flown = [0] * N_LANES
     for lane, episode in enumerate(episodes):
         episode.reset(SEED + lane)

@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 
-from uas_coverage_env.autopilot import write_brake, write_command
+from uas_coverage_env.autopilot import write_command
+from uas_coverage_env.autopilot.control import write_brake
 from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.entities.commands import CLIMB, GO_TO, HOME, VELOCITY
 from uas_coverage_env.env import ActionKind
-from uas_coverage_env.vehicle import VX, VY, Z
-from uas_coverage_env.world import CLIMB, GO_TO, HOME, VELOCITY, Velocity
+from uas_coverage_env.vehicle.layout import VX, VY, Z
+from uas_coverage_env.world import Velocity
 
 
 @kernel

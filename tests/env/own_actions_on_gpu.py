@@ -4,9 +4,9 @@ import numpy as np
 from own_actions import CLIMB_RATE, faulty
 from practice_grounds import practice_ground
 
-from uas_coverage_env.env.cuda import CudaMissions
-from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.episode import Episode
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.gpu.missions import CudaMissions
 
 
 def compare():

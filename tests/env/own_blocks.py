@@ -4,7 +4,7 @@ import math
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env import Feature, ObservationBlock, RewardTerm
-from uas_coverage_env.vehicle import VX, VY, X, Y
+from uas_coverage_env.vehicle.layout import VX, VY, X, Y
 
 
 @kernel

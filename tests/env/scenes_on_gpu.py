@@ -4,7 +4,7 @@ import numpy as np
 from beside_episodes import N_LANES, SEED, compare
 from changing_missions import AGAIN, EVENTS, STEPS, mission
 
-from uas_coverage_env.env.cuda import CudaMissions
+from uas_coverage_env.env.gpu.missions import CudaMissions
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import GeneratedScenarios
 

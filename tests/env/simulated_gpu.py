@@ -17,14 +17,14 @@ import own_actions_on_gpu
 import own_disturbances_on_gpu
 import scenes_on_gpu
 
-from uas_coverage_env.env import cuda
-from uas_coverage_env.env.cuda import CudaMissions
-from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.memory import CONTACT, LIMITS, REWARD
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.episode import Episode
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.gpu import missions as missions_on_gpu
+from uas_coverage_env.env.gpu.missions import CudaMissions
+from uas_coverage_env.env.report import CONTACT, LIMITS, REWARD
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.scenario.packs import Sorties
-from uas_coverage_env.vehicle import limit_names
+from uas_coverage_env.vehicle.limits import limit_names
 
 N_LANES, N_STEPS = 2, 13
 
@@ -38,7 +38,7 @@ def compare(ground, ask=None, **settings):
         **settings: Of both.
     """
     missions = CudaMissions(N_LANES, ground, **settings)
-    episodes = [Episode(ground, MissionSettings(**settings)) for _ in range(N_LANES)]
+    episodes = [Episode(ground, MissionSettings.of(settings)) for _ in range(N_LANES)]
     size = episodes[0].actions.size
     for episode in episodes:
         episode.reset()
@@ -114,7 +114,7 @@ def swapping_ground():
 if __name__ == "__main__":
     # the simulator starts a thread of the processor for each of a block, whether it flies a lane or
     # not: one that flies none is enough
-    cuda.THREADS_PER_BLOCK = N_LANES + 1
+    missions_on_gpu.THREADS_PER_BLOCK = N_LANES + 1
     still = practice_ground(n_uas=2, tower=True, n_moving=1, max_steps=5)
     windy = still.model_copy(update={"wind": Wind(mean_mps=4.0, from_deg=30.0, up_mps=0.5)})
     high = with_roles(still.model_copy(update={"min_height_m": 6.0}))

@@ -10,8 +10,11 @@ from hypothesis import strategies as st
 from practice_grounds import practice_ground
 
 from uas_coverage_env import GoTo, UasStatus, uas_coverage_v0
-from uas_coverage_env.env import ACTION_NAMES, HOME_CHOICE, K_WAYPOINTS
-from uas_coverage_env.env.actions import actions_of
+from uas_coverage_env.env import HOME_CHOICE, K_WAYPOINTS
+from uas_coverage_env.env.actions.given import actions_of
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
+from uas_coverage_env.env.actions.velocity import VELOCITY
+from uas_coverage_env.env.actions.wrench import WRENCH
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.vehicle import load_vehicle
 
@@ -76,7 +79,7 @@ def test_wrench_spans_the_uneven_limits_of_lift():
 
 def test_every_vehicle_has_its_own_limits():
     scenario = practice_ground(vehicles=("s500_v2", "hexacopter"))
-    ranges = actions_of("wrench", scenario).ranges
+    ranges = actions_of(WRENCH, scenario).ranges
     lifts = [load_vehicle(name).limits.lift_max_N for name in ("s500_v2", "hexacopter")]
     assert ranges[:, 0, 2].tolist() == pytest.approx(lifts)
     assert lifts[0] != lifts[1]
@@ -299,5 +302,5 @@ def test_extreme_but_valid_actions_never_leave_the_observation_space(name, seed)
 
 def test_the_village_has_the_altitudes_that_the_documentation_says():
     scenario = load_scenario("village")
-    ranges = actions_of("velocity", scenario).ranges
+    ranges = actions_of(VELOCITY, scenario).ranges
     assert (ranges[0, 2, 0], ranges[0, 2, 2]) == pytest.approx((1.5, 48.5))

@@ -6,14 +6,17 @@ import pytest
 from gymnasium.error import ResetNeeded
 from practice_grounds import practice_ground, with_roles
 
-from uas_coverage_env.env import ACTION_NAMES, CoverageBatch, CoverageParallelEnv, ScenarioPool
-from uas_coverage_env.env.batch_kernel import ABSENT, drawn
-from uas_coverage_env.env.memory import CONTACT, ENERGY, FIRST_TERM, LIMITS, STATUS
-from uas_coverage_env.env.rewards import REWARD_TERMS
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.entities.state import FLYING, LOST
+from uas_coverage_env.env import CoverageBatch, CoverageParallelEnv
+from uas_coverage_env.env.actions.kinds import ACTION_NAMES
+from uas_coverage_env.env.batch.kernel import ABSENT, drawn
+from uas_coverage_env.env.batch.pool import ScenarioPool
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.report import CONTACT, ENERGY, FIRST_TERM, LIMITS, STATUS
+from uas_coverage_env.env.rewards.terms import REWARD_TERMS
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation.pool import pool_worlds
-from uas_coverage_env.world import FLYING, LOST, build_arena
+from uas_coverage_env.world import build_arena
 from uas_coverage_env.world.arena import ARENA
 
 MIXED = (
@@ -279,7 +282,7 @@ def test_a_batch_has_to_be_reset_first():
 
 
 def test_a_pool_takes_names_and_cuts_missions():
-    pool = ScenarioPool(["open_field", MIXED[0]], MissionSettings(max_cycles=7))
+    pool = ScenarioPool(["open_field", MIXED[0]], MissionSettings(max_steps=7))
     assert [scenario.max_steps for scenario in pool.scenarios] == [7, 7]
     assert len(pool) == 2
     np.testing.assert_array_equal(pool.n_uas, [2, 3])

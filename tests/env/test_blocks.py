@@ -18,16 +18,17 @@ from uas_coverage_env.env import (
     REWARD,
     CoverageBatch,
     Feature,
+    MissionInterface,
+    MissionSettings,
     ObservationBlock,
-    Observer,
     RewardTerm,
-    observation_bounds,
     observation_columns,
 )
 from uas_coverage_env.env.actions.velocity import VELOCITY
+from uas_coverage_env.env.observation.layout import observation_bounds
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import VX, VY, X, Y
+from uas_coverage_env.vehicle.layout import VX, VY, X, Y
 
 BEACON = beacon(30.0, -20.0)
 OBSERVED = (*OBSERVATION, BEACON)
@@ -154,7 +155,7 @@ def test_a_planner_gets_the_same_observation_from_an_observer():
     ground = practice_ground(n_uas=2)
     env = uas_coverage_v0.parallel_env(ground, observation=OBSERVED)
     observations, _ = env.reset(seed=0)
-    observer = Observer(MissionBrief.of(ground), OBSERVED)
+    observer = MissionInterface(MissionBrief.of(ground), MissionSettings(observation=OBSERVED))
     np.testing.assert_array_equal(observer.observe(env.swarm_state()), list(observations.values()))
 
 

@@ -10,7 +10,7 @@ from numba import typeof
 from own_actions import CLIMB_RATE
 
 from uas_coverage_env.compiled.internals import KernelDispatcher
-from uas_coverage_env.env import cuda as missions_on_gpu
+from uas_coverage_env.env.gpu import missions as missions_on_gpu
 
 COMPUTE_CAPABILITY = (8, 0)
 

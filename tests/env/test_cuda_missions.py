@@ -2,8 +2,8 @@ from changing_missions import EVENTS, EVERYTHING
 from scenes_on_gpu import EVERY_KIND
 
 from uas_coverage_env import ContactKind
+from uas_coverage_env.entities.state import SWAPPING
 from uas_coverage_env.scenario.events import EVENT_KINDS
-from uas_coverage_env.world import SWAPPING
 
 
 def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_episodes(flown_on_gpu):

@@ -11,7 +11,7 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import uas_coverage_v0
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.cuda import CudaMissions
+from uas_coverage_env.env.gpu.missions import CudaMissions
 from uas_coverage_env.features import constant_wind, disturbances_of
 from uas_coverage_env.scenario import Uncertainty, Wind, with_disturbances
 

@@ -7,7 +7,7 @@ from practice_grounds import box, practice_ground
 
 from uas_coverage_env import ContactKind, UasStatus, World, uas_coverage_v0
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.cuda import CudaMissions
+from uas_coverage_env.env.gpu.missions import CudaMissions
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.world import Wrench
 

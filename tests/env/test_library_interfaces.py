@@ -20,10 +20,12 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import ContactKind, UasStatus, load_scenario, uas_coverage_v0
 from uas_coverage_env.entities.codes import CommandKind
+from uas_coverage_env.entities.commands import KIND_NAMES
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.entities.state import STATUS_NAMES
 from uas_coverage_env.env import HOME_CHOICE, CoverageSwarmEnv
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import GeneratedScenarios
-from uas_coverage_env.world import CONTACT_NAMES, KIND_NAMES, STATUS_NAMES
 
 ID = "UASCoverage-v0"
 GROUND = practice_ground(tower=True, n_moving=1, max_steps=25)

@@ -13,7 +13,8 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import generate_scenario, load_scenario, uas_coverage_v0
 from uas_coverage_env.compiled.progress import COMPILATIONS
-from uas_coverage_env.env import CoverageBatch, CoverageSwarmEnv, CoverageVectorEnv, ScenarioPool
+from uas_coverage_env.env import CoverageBatch, CoverageSwarmEnv, CoverageVectorEnv
+from uas_coverage_env.env.batch.pool import ScenarioPool
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.scenario_sets import SETS
 from uas_coverage_env.scenario import GeneratedScenarios, MissionSource

@@ -13,13 +13,12 @@ from uas_coverage_env.env import (
     OBSERVATION_SIZE,
     CoverageParallelEnv,
     CoverageSwarmEnv,
-    layout_table,
-    observation_bounds,
     observation_columns,
 )
+from uas_coverage_env.env.observation.layout import layout_table, observation_bounds
 from uas_coverage_env.env.observation.surroundings import free_way
 from uas_coverage_env.scenario import generate_scenario, load_scenario
-from uas_coverage_env.vehicle import DOD, PHI, U_TH, VX, WX
+from uas_coverage_env.vehicle.layout import DOD, PHI, U_TH, VX, WX
 from uas_coverage_env.world import build_arena
 
 

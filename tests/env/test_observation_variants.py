@@ -12,7 +12,6 @@ from practice_grounds import practice_ground
 from uas_coverage_env import uas_coverage_v0
 from uas_coverage_env.env import (
     OBSERVATION,
-    OBSERVATIONS,
     CoverageBatch,
     ObservationBlock,
     full_state,
@@ -21,10 +20,11 @@ from uas_coverage_env.env import (
     local,
     observation_columns,
 )
+from uas_coverage_env.env.observation.named import OBSERVATIONS
 from uas_coverage_env.env.observation.surroundings import SURROUNDINGS
 from uas_coverage_env.env.observation.waypoints import WAYPOINTS
 from uas_coverage_env.flight import as_planner, rollout
-from uas_coverage_env.vehicle import X, Y
+from uas_coverage_env.vehicle.layout import X, Y
 
 GROUND = practice_ground(n_uas=3, tower=True, n_moving=1, weights=[1.0, 2.0, 4.0])
 SMALL = grid(8, 80.0)  # cells of 10 m

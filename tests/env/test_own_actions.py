@@ -22,7 +22,8 @@ from practice_grounds import practice_ground
 from uas_coverage_env import UasStatus, uas_coverage_v0
 from uas_coverage_env.env import ActionKind, CoverageBatch
 from uas_coverage_env.env.actions import ACTIONS
-from uas_coverage_env.vehicle import VX, VY, VZ, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import VX, VY, VZ
 
 OWN = [CLIMB_RATE, heading_and_speed(5.0), MANOEUVRES]
 NAMES = [kind.name for kind in OWN]

@@ -10,8 +10,8 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import ContactKind, UasStatus, uas_coverage_v0
 from uas_coverage_env.env import HOME_CHOICE
-from uas_coverage_env.env.episode import Episode
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.episode.episode import Episode
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import load_scenario
 

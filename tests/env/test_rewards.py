@@ -7,7 +7,8 @@ import pytest
 from practice_grounds import practice_ground
 
 from uas_coverage_env import CommandKind, ContactKind, UasStatus, uas_coverage_v0
-from uas_coverage_env.env import HOME_CHOICE, REWARD, REWARD_TERMS, rewards_table
+from uas_coverage_env.env import HOME_CHOICE, REWARD
+from uas_coverage_env.env.rewards.terms import REWARD_TERMS, rewards_table
 
 
 def run(env, policy, limit=200):

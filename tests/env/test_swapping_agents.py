@@ -12,7 +12,7 @@ from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import observation_columns
 from uas_coverage_env.scenario.packs import Sorties
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import GoTo
 
 with warnings.catch_warnings():

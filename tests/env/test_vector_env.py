@@ -12,9 +12,9 @@ from practice_grounds import practice_ground
 
 import uas_coverage_env  # noqa: F401  it registers the ids
 from uas_coverage_env.env import CoverageSwarmEnv, CoverageVectorEnv
-from uas_coverage_env.env.batch_kernel import ABSENT
-from uas_coverage_env.env.rewards import REWARD_TERMS
-from uas_coverage_env.env.screen import Screen
+from uas_coverage_env.env.batch.kernel import ABSENT
+from uas_coverage_env.env.rendering.screen import Screen
+from uas_coverage_env.env.rewards.terms import REWARD_TERMS
 
 ID = "UASCoverage-v0"
 GROUND = practice_ground(tower=True, n_moving=1, max_steps=25)

@@ -6,8 +6,8 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import uas_coverage_v0
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.kernel import LIMITS
-from uas_coverage_env.vehicle import limit_names
+from uas_coverage_env.env.episode.step import LIMITS
+from uas_coverage_env.vehicle.limits import limit_names
 
 GROUND = practice_ground(n_uas=2, size_m=2000.0)
 EXPECTED = [set(), set(), set(), set(), {"tilt"}, {"speed", "tilt"}]

@@ -19,11 +19,12 @@ from uas_coverage_env import (
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.actions.wrench import WRENCH
-from uas_coverage_env.env.memory import CONTACT
+from uas_coverage_env.env.report import CONTACT
 from uas_coverage_env.features.wind import Gust
 from uas_coverage_env.scenario import Waypoint, Wind
-from uas_coverage_env.vehicle import LIMIT_NAMES, VX, VY, load_vehicle
-from uas_coverage_env.vehicle.layout import PHI, THETA
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VY
+from uas_coverage_env.vehicle.limits import LIMIT_NAMES
 from uas_coverage_env.world import CommandKind
 
 WIDE = {"n_uas": 2, "size_m": 2000.0}

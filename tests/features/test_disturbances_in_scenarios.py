@@ -171,9 +171,9 @@ def test_the_seed_of_a_rollout_is_that_of_what_disturbances_draw():
 
 def test_the_check_of_a_scenario_says_what_disturbs(installed, file_with, tmp_path, capsys):
     picture = str(tmp_path / "drawn.png")
-    assert main(["scenarios", "check", str(file_with(*WIND, *GUSTS)), "--picture", picture]) == 0
+    assert main(["scenario", "check", str(file_with(*WIND, *GUSTS)), "--picture", picture]) == 0
     told = capsys.readouterr().out
     assert "disturbed  wind of 4 m/s from 270 degrees\n" in told
     assert "disturbed  gusts\n" in told
-    assert main(["scenarios", "check", "village", "--picture", f"{picture}.png"]) == 0
+    assert main(["scenario", "check", "village", "--picture", f"{picture}.png"]) == 0
     assert "disturbed" not in capsys.readouterr().out

@@ -13,7 +13,7 @@ from uas_coverage_env.features import Disturbance, constant_wind, disturbances_o
 from uas_coverage_env.scenario import Scenario, Wind
 from uas_coverage_env.scenario.toml_text import toml_text
 from uas_coverage_env.simulation.pool import pool_worlds
-from uas_coverage_env.vehicle import DOD, LIFT, TAU_X, THETA, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle.layout import DOD, LIFT, TAU_X, THETA, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
 from uas_coverage_env.vehicle.record import compile_vehicle
 from uas_coverage_env.world import Velocity, Wrench

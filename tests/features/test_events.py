@@ -6,9 +6,11 @@ from eventful import STARTS_M, WAYPOINTS, after, corners_m, event, field, hoveri
 from small_worlds import mover
 
 from uas_coverage_env import MissionBrief, World, rollout
-from uas_coverage_env.flight import accomplished, coverage, home, summary
-from uas_coverage_env.vehicle import DOD, LIFT, VX
-from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity, Wrench
+from uas_coverage_env.entities.state import FLYING, LANDED, LOST
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.metrics import accomplished, coverage, home
+from uas_coverage_env.vehicle.layout import DOD, LIFT, VX
+from uas_coverage_env.world import GoTo, Velocity, Wrench
 
 RESPONSES = pytest.mark.parametrize("then", ["go_on", "hover", "return"])
 

@@ -6,13 +6,14 @@ from eventful import WAYPOINTS, event, field
 from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.velocity.planner import LearnedVelocity
 from uas_coverage_agents.waypoint.planner import LearnedWaypoint
-from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc import MilpMpc
+from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env.flight.metrics import accomplished
 
 QUICK = {"deterministic": True, "at_once": 1, "horizon": 8, "threads": 1, "teams": 2}
 

@@ -11,14 +11,15 @@ from uas_coverage_env.env import CoverageVectorEnv
 from uas_coverage_env.features import disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import (
-    LEVELS,
     GeneratedScenarios,
     Uncertainty,
-    installed_families,
     sample_scenario,
     with_disturbances,
 )
-from uas_coverage_env.vehicle import CAPACITY, DOD, RESISTANCE, VZ, Z
+from uas_coverage_env.scenario.families import installed_families
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
+from uas_coverage_env.vehicle.layout import DOD, VZ, Z
+from uas_coverage_env.vehicle.true_vehicle import CAPACITY, RESISTANCE
 from uas_coverage_env.world import Velocity, Wrench
 
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])
@@ -137,8 +138,8 @@ def test_a_mistake_in_the_bounds_is_one_line(tmp_path, line, message):
 
 
 def test_levels_grow_and_each_begins_where_the_one_before_ends():
-    levels = list(LEVELS.values())
-    assert list(LEVELS) == ["light", "moderate", "strong"]
+    levels = list(DISTURBANCE_LEVELS.values())
+    assert list(DISTURBANCE_LEVELS) == ["light", "moderate", "strong"]
     assert [level.mean_mps[1] for level in levels] == [4.0, 7.0, 10.0]
     for weaker, stronger in itertools.pairwise(levels):
         assert weaker.mean_mps[1] == stronger.mean_mps[0]
@@ -149,7 +150,7 @@ def test_levels_grow_and_each_begins_where_the_one_before_ends():
 
 def test_a_level_changes_the_air_and_the_vehicles_of_a_town_and_nothing_else():
     still = generate_scenario(7)
-    for name, level in LEVELS.items():
+    for name, level in DISTURBANCE_LEVELS.items():
         windy = generate_scenario(7, disturbances=name)
         assert windy.name == f"{still.name}-{name}"
         assert level.mean_mps[0] <= windy.wind.mean_mps <= level.mean_mps[1]
@@ -165,7 +166,7 @@ def test_a_level_changes_the_air_and_the_vehicles_of_a_town_and_nothing_else():
 
 
 def test_generated_scenarios_have_the_levels_by_name():
-    for name in LEVELS:
+    for name in DISTURBANCE_LEVELS:
         family = installed_families()[f"generated-{name}"]
         assert family == GeneratedScenarios(disturbances=name)
         assert family.of_seed(5) == sample_scenario(5, disturbances=name)

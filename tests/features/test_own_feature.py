@@ -13,7 +13,7 @@ from uas_coverage_env.compiled.kernels import rare_kernel
 from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.compiled.random import counted, uniform
 from uas_coverage_env.compiled.views import record_view
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.features.table import FeatureTable
 
 RAIN_DTYPE = record_dtype([("share_per_s", "f8")])
@@ -50,14 +50,14 @@ class Rain(FeatureTable):
 
     def features(self):
         records = np.array([(self.share_per_s,)], dtype=RAIN_DTYPE)
-        return (Feature("rain", {Point.BEGIN: draw, Point.ACT: drain}, records, WET_DTYPE),)
+        return (MissionFeature("rain", {Point.BEGIN: draw, Point.ACT: drain}, records, WET_DTYPE),)
 '''
 
 ICING = '''
 from typing import ClassVar, Literal
 from uas_coverage_env.compiled.kernels import rare_kernel
 from uas_coverage_env.features.event import OfUas, concerns, lasts
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.vehicle import LIFT
 
 
@@ -78,7 +78,7 @@ class Icing(OfUas):
         thrust_lost: Of the weight [-].
     """
 
-    feature: ClassVar = Feature("icing", {Point.ACT: lose_thrust})
+    feature: ClassVar = MissionFeature("icing", {Point.ACT: lose_thrust})
     kind: Literal["icing"]
     for_s: float
     thrust_lost: float = 0.05
@@ -99,7 +99,7 @@ import uas_coverage_env.features as features
 features.__path__.extend(sys.argv[1:])
 from uas_coverage_env import load_scenario
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.parallel import CoverageParallelEnv
+from uas_coverage_env.env.api.parallel import CoverageParallelEnv
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World

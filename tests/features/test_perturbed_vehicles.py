@@ -8,18 +8,9 @@ from small_worlds import meadow
 from uas_coverage_env import World
 from uas_coverage_env.scenario import Scenario, Uncertainty
 from uas_coverage_env.scenario.toml_text import toml_text
-from uas_coverage_env.vehicle import (
-    DELTA_THRUST,
-    DOD,
-    LIFT,
-    PERTURBATIONS,
-    U_TH,
-    VEHICLE_DTYPE,
-    VX,
-    VZ,
-    X,
-    Z,
-)
+from uas_coverage_env.vehicle.layout import DELTA_THRUST, DOD, LIFT, U_TH, VX, VZ, X, Z
+from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
+from uas_coverage_env.vehicle.true_vehicle import PERTURBATIONS
 from uas_coverage_env.world import Velocity, Wrench
 
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])

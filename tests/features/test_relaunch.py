@@ -13,15 +13,17 @@ from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
 
 from uas_coverage_env import Flight, MissionBrief, World, rollout
+from uas_coverage_env.entities.state import FLYING, LANDED, LOST
 from uas_coverage_env.files.strict_toml import InputError, parse
-from uas_coverage_env.flight import accomplished, coverage, energy_Wh, home
+from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.flight.record import MODES
-from uas_coverage_env.mission import Relaunch, first_sight
+from uas_coverage_env.mission import first_sight
 from uas_coverage_env.mission.handover import SILENT_S
+from uas_coverage_env.mission.relaunch import Relaunch
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.uas_coverage_v0 import parallel_env
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo
+from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.world import GoTo
 
 AHEAD = (waypoint((80.0, 30.0, -20.0), 8.0), waypoint((100.0, 30.0, -20.0), 8.0))
 LOST_AT_S = 5.0

@@ -8,7 +8,9 @@ from eventful import STARTS_M, WAYPOINTS, corners_m, event, field
 
 from uas_coverage_env import rollout
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Flight, SceneHistory, covered_at, flight_pictures
+from uas_coverage_env.flight import Flight, covered_at
+from uas_coverage_env.flight.picture import flight_pictures
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.replay.figures import map_figure
 from uas_coverage_env.replay.flight_data import flight_data
 

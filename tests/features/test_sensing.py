@@ -5,8 +5,8 @@ import pytest
 from eventful import WAYPOINTS, after, field, hovering
 
 from uas_coverage_env import World, rollout
-from uas_coverage_env.flight import accomplished, coverage
-from uas_coverage_env.vehicle import DOD, VX, VZ, Z
+from uas_coverage_env.flight.metrics import accomplished, coverage
+from uas_coverage_env.vehicle.layout import DOD, VX, VZ, Z
 from uas_coverage_env.world import GoTo, Velocity
 
 GOOD = {"position_noise_m": 0.3, "velocity_noise_mps": 0.1, "position_bias_m": 0.3,

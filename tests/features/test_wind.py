@@ -11,8 +11,9 @@ from uas_coverage_env import World, load_scenario
 from uas_coverage_env.features import constant_wind, disturbances_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Gust, RandomGusts, Wind
-from uas_coverage_env.vehicle import DOD, VX, VZ, X, Y, Z, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.derived import power_W
+from uas_coverage_env.vehicle.layout import DOD, VX, VZ, X, Y, Z
 from uas_coverage_env.vehicle.thrust_correction import level_flight_N
 from uas_coverage_env.world import Wrench
 

@@ -6,7 +6,7 @@ import pytest
 from numba.core import event
 from small_worlds import meadow
 
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.autopilot.guidance import steer
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.world import GoTo

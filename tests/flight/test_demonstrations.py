@@ -7,10 +7,11 @@ from leaderboard_rows import flights_in
 from uas_coverage_env import load_planner, load_scenario, rollout, uas_coverage_v0
 from uas_coverage_env.cli import main
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
-from uas_coverage_env.env.observer import Observer
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Assistants, Demonstrations, demonstrate, episode_return
+from uas_coverage_env.flight import Assistants, Demonstrations, demonstrate
 from uas_coverage_env.flight.demonstrations import UNKNOWN_CHOICE, written
+from uas_coverage_env.flight.metrics import episode_return
 
 SCENARIO = load_scenario("open_field")
 
@@ -49,7 +50,7 @@ def test_the_choice_is_the_waypoint_that_the_uas_covers_next():
 
         def reset(self, brief, seed):
             self.planner.reset(brief, seed)
-            self.observer = Observer(brief)
+            self.observer = MissionInterface(brief)
 
         def act(self, swarm):
             self.observer.observe(swarm)
@@ -117,7 +118,7 @@ def test_missions_survive_their_files_and_damage_is_named(shown, tmp_path):
 
 
 def asked(out, *more, planner="nearest-waypoint"):
-    words = ["demonstrate", "open_field", "--planner", planner, "--jobs", "1"]
+    words = ["planner", "demonstrate", "open_field", "--planner", planner, "--jobs", "1"]
     return [*words, "--out", str(out), *more]
 
 

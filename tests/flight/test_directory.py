@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Decision, Flight, rollout, summary
+from uas_coverage_env.flight import Decision, Flight, rollout
 from uas_coverage_env.flight.directory import FLIGHT_COLUMNS
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.world import Velocity, Wrench
 
 FILES = {
@@ -144,12 +145,15 @@ def test_the_summary_follows_from_the_rows(saved, yard):
 
 def test_the_summary_has_the_fields_of_the_contract(saved):
     result = json.loads((saved / "summary.json").read_text())
-    assert list(result) == [
-        *("coverage", "steps", "energy_Wh", "return", "reward_terms", "all_home"),
-        *("min_separation_m",),
-        *("min_obstacle_clearance_m", "violations", "breaches", "wall_time_s"),
-        *("decision_time_s", "fallbacks", "mip_gap_p50", "versions", "seed", "planner"),
-    ]
+    kinds = {
+        **dict.fromkeys(("coverage", "energy_Wh", "wall_time_s", "return"), float),
+        **dict.fromkeys(("steps", "breaches", "fallbacks", "seed"), int),
+        **dict.fromkeys(("min_separation_m", "min_obstacle_clearance_m"), float),
+        **dict.fromkeys(("decision_time_s", "versions", "planner", "reward_terms"), dict),
+        **{"all_home": bool, "violations": list, "mip_gap_p50": type(None)},
+    }
+    assert {key: type(result[key]) for key in kinds} == kinds
+    assert "failed_figures" not in result
     assert list(result["decision_time_s"]) == ["p50", "p95", "p99", "max"]
     assert result["planner"] == {"name": "Listed", "options": {}}
     assert result["seed"] == 3

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from uas_coverage_env import InputError, as_planner, evaluate, load_planner, rollout
-from uas_coverage_env.env import REWARD_TERMS, CoverageParallelEnv
-from uas_coverage_env.flight import Flight, energy_Wh, episode_return, reward_sums
+from uas_coverage_env.env import CoverageParallelEnv
+from uas_coverage_env.env.rewards.terms import REWARD_TERMS
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.metrics import energy_Wh, episode_return, reward_sums
 from uas_coverage_env.scenario import generate_scenario
 
 TOWN = generate_scenario(4, n_uas=2, n_waypoints=4, n_obstacles=2)
@@ -186,4 +188,5 @@ def test_a_policy_is_a_planner_like_any_other():
 def test_an_evaluation_prints_its_means():
     text = str(evaluate("hover", TOWN, seeds=[0, 1], max_cycles=3))
     assert "return" in text
-    assert "lost            0 of 4 UAS" in text
+    lines = dict(line.rsplit(maxsplit=1) for line in text.splitlines())
+    assert (lines["lost"], lines["UAS"]) == ("0", "4")

@@ -3,14 +3,16 @@
 import pytest
 from small_worlds import box, meadow
 
-from uas_coverage_env.flight import rollout, summary
+from uas_coverage_env.flight import rollout
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.mission import first_sight
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import height_above_ground_m, take_off
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, U_TH, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.battery import BatteryState
+from uas_coverage_env.vehicle.layout import DOD, U_TH
 from uas_coverage_env.vehicle.vertical_flight import vertical_flight
 from uas_coverage_env.world import GoTo, Velocity
 

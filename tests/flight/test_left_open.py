@@ -9,10 +9,11 @@ from closed_yards import HOME, INSIDE, OPEN, yard
 from small_worlds import box, meadow, mover, waypoint
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import Flight, Why, rollout, summary
+from uas_coverage_env.flight import Flight, Why, rollout
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.flight.left_open import left_open
 from uas_coverage_env.flight.record import LOST
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import GoTo
 
 

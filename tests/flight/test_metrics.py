@@ -3,17 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from uas_coverage_env.flight import (
-    DecisionRecord,
-    Flight,
-    accomplished,
-    coverage,
-    energy_Wh,
-    home,
-    rollout,
-    summary,
-)
-from uas_coverage_env.flight.record import LANDED, LOST
+from uas_coverage_env.flight import Flight, rollout
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home
+from uas_coverage_env.flight.record import LANDED, LOST, DecisionRecord
 
 
 def test_energy_is_voltage_times_current_over_time(flight):

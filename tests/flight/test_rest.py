@@ -8,7 +8,8 @@ import pytest
 from uas_coverage_env import Flight, generate_scenario, load_planner, load_scenario, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, covered_at, rest_of
+from uas_coverage_env.flight import covered_at, rest_of
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.flight.record import LOST
 
 
@@ -121,7 +122,9 @@ def test_the_command_writes_a_scenario_that_is_flown(broken_off, tmp_path, capsy
     broken_off.save(tmp_path / "flight")
     for extra in ((), ("--from-here",)):
         out = tmp_path / f"rest{len(extra)}.toml"
-        assert main(["resume", str(tmp_path / "flight"), "--out", str(out), *extra]) == 0
+        assert (
+            main(["scenario", "resume", str(tmp_path / "flight"), "--out", str(out), *extra]) == 0
+        )
         said = capsys.readouterr().out
         left = len(broken_off.scenario.waypoints) - broken_off.covered[-1]
         assert f"{left} of 8 waypoints are left" in said
@@ -145,7 +148,7 @@ def test_mistakes_are_refused_in_one_line(mission, broken_off, tmp_path, capsys)
         ("nowhere", new, "nowhere"),
         ("done", new, "has covered everything"),
     ):
-        assert main(["resume", str(tmp_path / directory), "--out", out]) == 2
+        assert main(["scenario", "resume", str(tmp_path / directory), "--out", out]) == 2
         err = capsys.readouterr().err
         assert said in err
         assert err.count("\n") == 1

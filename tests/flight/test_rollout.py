@@ -16,11 +16,9 @@ from uas_coverage_env.flight import (
     Flight,
     PlannerError,
     PlannerOptions,
-    accomplished,
-    energy_Wh,
-    filtered_share,
     rollout,
 )
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh, filtered_share
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import load_vehicle

@@ -8,9 +8,11 @@ import pytest
 from small_worlds import meadow, waypoint
 
 from uas_coverage_env import load_planner, rollout
-from uas_coverage_env.flight import footprints_m, seen_ground, seen_pictures, summary
+from uas_coverage_env.flight import seen_ground
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.seen import footprints_m, seen_pictures
 from uas_coverage_env.scenario import Decoration, Scenario, Sensor
-from uas_coverage_env.vehicle import PHI, PSI, THETA, Z
+from uas_coverage_env.vehicle.layout import PHI, PSI, THETA, Z
 
 CAMERA = Sensor(name="camera", field_of_view_deg=(90.0, 60.0))
 FIXED = CAMERA.model_copy(update={"stabilised": False})

@@ -10,7 +10,8 @@ import pytest
 from uas_coverage_env import Flight, generate_scenario, load_scenario, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, covered_at, fly_sorties, sorties_summary
+from uas_coverage_env.flight import covered_at, fly_sorties, sorties_summary
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import warnings
 
 
@@ -143,7 +144,7 @@ def test_ctrl_c_while_a_sortie_is_written_ends_the_sorties(mission, tmp_path, mo
     mission.to_file(tmp_path / "mission.toml")
     out = tmp_path / "out"
     command = ["run", str(tmp_path / "mission.toml"), "--planner", "nearest-waypoint"]
-    assert main([*command, "--sorties", "9", "--out", str(out)]) == 1
+    assert main([*command, "--sorties", "9", "--out", str(out)]) == 130
     result = json.loads((out / "sorties.json").read_text())
     assert result["ended"] == "stopped"
     assert len(result["sorties"]) == 1

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from uas_coverage_env.geometry import nearest_on_segment
+from uas_coverage_env.geometry.nearest import nearest_on_segment
 
 places = arrays(np.float64, 3, elements=st.floats(-50.0, 50.0))
 

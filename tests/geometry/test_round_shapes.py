@@ -7,12 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uas_coverage_env.geometry import (
-    closed_cylinder_faces,
-    cylinder_faces,
-    inner_factor,
-    sphere_faces,
-)
+from uas_coverage_env.geometry import cylinder_faces, sphere_faces
+from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces, inner_factor
 
 EXAMPLES = settings(max_examples=80, deadline=None, derandomize=True)
 SIDES = st.sampled_from([4, 6, 8, 10, 12, 16])

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import linprog
 
-from uas_coverage_env.geometry import (
-    ConvexPolytope,
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.segments import (
     cylinder_clearance,
     segment_clearance,
     segment_meets,

@@ -3,7 +3,8 @@
 import pytest
 
 from uas_coverage_env.cli.figures_of_flight import beside_the_best
-from uas_coverage_env.flight import load_planner, planner_names, rollout, summary
+from uas_coverage_env.flight import load_planner, planner_names, rollout
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.leaderboard.best_flown import best_flown
 from uas_coverage_env.scenario import load_scenario, scenario_names
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from leaderboard_rows import failed_row, row
 
-from uas_coverage_env.leaderboard import Comparison, write
+from uas_coverage_env.leaderboard import Comparison
 
 ROOT = Path(__file__).parents[2]
 
@@ -29,7 +29,7 @@ def test_tables_and_picture_go_between_the_marks_as_often_as_one_likes(put_table
     rows = [row(s, "base") for s in "ab"] + [row(s, "p", steps=90) for s in "ab"]
     sweep = tmp_path / "sweep"
     sweep.mkdir()
-    write(Comparison.of([*rows, failed_row("a", "q")], 5, "base", "a command", "1"), sweep)
+    Comparison.of([*rows, failed_row("a", "q")], 5, "base", "a command", "1").write(sweep)
     for _ in range(2):
         assert put_table.main(str(sweep)) == 0
     short = (tmp_path / "README.md").read_text()
@@ -51,7 +51,7 @@ def test_a_readme_without_marks_is_left_alone(put_table, tmp_path, capsys):
     (tmp_path / "baselines/README.md").write_text("mine")
     sweep = tmp_path / "sweep"
     sweep.mkdir()
-    write(Comparison.of([row()], 1, "p", "a command", "1"), sweep)
+    Comparison.of([row()], 1, "p", "a command", "1").write(sweep)
     assert put_table.main(str(sweep)) == 2
     assert "has no <!-- leaderboard -->" in capsys.readouterr().err
     assert (tmp_path / "baselines/README.md").read_text() == "mine"
@@ -62,7 +62,7 @@ def test_the_test_set_has_marks_of_its_own(put_table, tmp_path):
     rows = [row(s, "base") for s in "ab"] + [row(s, "p", steps=90) for s in "ab"]
     sweep = tmp_path / "sweep"
     sweep.mkdir()
-    write(Comparison.of(rows, 5, "base", "a command", "1"), sweep)
+    Comparison.of(rows, 5, "base", "a command", "1").write(sweep)
     readme, other = tmp_path / "baselines/README.md", tmp_path / "README.md"
     untouched = other.read_text()
     assert put_table.main(str(sweep), "test") == 0
@@ -78,7 +78,7 @@ def test_tables_of_flights_in_wind_say_how_much_was_covered_and_who_came_home(pu
     rows = [row(s, "base") for s in "ab"] + [row(s, "p", steps=90) for s in "ab"]
     sweep = tmp_path / "sweep"
     sweep.mkdir()
-    write(Comparison.of([*rows, failed_row("a", "q")], 5, "base", "a command", "1"), sweep)
+    Comparison.of([*rows, failed_row("a", "q")], 5, "base", "a command", "1").write(sweep)
     assert put_table.main(str(sweep), "strong") == 0
     begin, end = put_table.marks_of("strong")
     inside = (tmp_path / "baselines/README.md").read_text().split(begin)[1].split(end)[0]
@@ -93,7 +93,7 @@ def test_tables_of_flights_in_wind_say_how_much_was_covered_and_who_came_home(pu
 def test_a_damaged_table_is_named_and_changes_nothing(put_table, tmp_path, capsys, content):
     sweep = tmp_path / "sweep"
     sweep.mkdir()
-    write(Comparison.of([row()], 1, "p", "a command", "1"), sweep)
+    Comparison.of([row()], 1, "p", "a command", "1").write(sweep)
     (sweep / "table.json").write_text(content)
     before = (tmp_path / "README.md").read_text()
     assert put_table.main(str(sweep)) == 2

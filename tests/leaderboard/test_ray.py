@@ -49,7 +49,11 @@ class Slow:
 COMMANDS = {
     "compare": ["compare", "--scenarios", "{yards}", "--seeds", "0:3", "--no-bounds"],
     "score": ["score", "--level", "easy", "--split", "validation", "--missions", "6"],
-    "demonstrate": ["demonstrate", *(f"generated:{seed}" for seed in range(900000, 900004))],
+    "demonstrate": [
+        "planner",
+        "demonstrate",
+        *(f"generated:{seed}" for seed in range(900000, 900004)),
+    ],
     "train": ["train", TINY, "--missions", "6"],
 }
 PLANNER = {"demonstrate": "--planner", "train": "--baselines"}

@@ -9,21 +9,22 @@ from small_worlds import meadow, waypoint
 from uas_coverage_env.cli import compare
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import Figure
 from uas_coverage_env.leaderboard import (
     Comparison,
     Row,
     bounds_of,
     leaderboard_figure,
-    published,
+    read_comparison,
     scores_of,
-    write,
 )
+from uas_coverage_env.leaderboard.row import FLOWN
+from uas_coverage_env.leaderboard.scores import Flights, Scores, _of_figure
 from uas_coverage_env.leaderboard.table import (
     NOTHING,
-    effort_cells,
+    cells,
     markdown,
     notes,
-    outcome_cells,
     scenarios_cells,
 )
 from uas_coverage_env.runner.jobs import Workers
@@ -66,7 +67,7 @@ def test_what_the_filter_replaced_is_averaged_over_the_flights_there_are():
     ]
     assert by_label(rows)["p"].filtered_percent == pytest.approx(15.0)
     nothing = by_label([row("a", "base"), failed_row("a", "p")])["p"]
-    assert nothing.filtered_percent == 0.0
+    assert nothing.filtered_percent is None
 
 
 def test_energy_per_percent_leaves_out_planners_that_covered_nothing():
@@ -109,9 +110,9 @@ def test_a_reference_that_has_not_flown_yet_leaves_the_comparison_empty():
 
 def test_cells_say_nothing_where_there_is_nothing_to_say():
     rows = [failed_row("a", "p"), row("a", "q|r", violations=1, accomplished=False)]
-    headings, cells = outcome_cells(scores_of(rows, "p"))
-    text = markdown((headings, cells))
-    assert all(len(line) == len(headings) for line in cells)
+    headings, lines = cells(scores_of(rows, "p"), "outcome")
+    text = markdown((headings, lines))
+    assert all(len(line) == len(headings) for line in lines)
     assert "nan" not in text
     assert r"q\|r" in text
     assert scenarios_cells(rows, ["p", "q|r", "s"])[1] == [["a", "failed", "violation", NOTHING]]
@@ -124,8 +125,8 @@ def test_energy_is_compared_with_the_bound_where_there_is_one():
     assert scores["p"].above_bound_percent.value == pytest.approx(35.0)
     assert scores["p"].above_bound_percent.n == 2
     assert scores["q"].above_bound_percent.value is None
-    headings, cells = effort_cells(list(scores.values()))
-    assert cells[0][headings.index("above the bound, %")].startswith("35.0")
+    headings, lines = cells(list(scores.values()), "effort")
+    assert lines[0][headings.index("above the bound, %")].startswith("35.0")
 
 
 def test_accomplished_lpv_flights_have_a_bound():
@@ -159,7 +160,7 @@ def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):
         failed_row("a", "p", 2),
     ]
     comparison = Comparison.of(rows, 12, "base", "uas-coverage compare ...", "2 flights at a time")
-    names = write(comparison, tmp_path)
+    names = comparison.write(tmp_path)
     assert set(names) <= {path.name for path in tmp_path.iterdir()}
     scores = json.loads((tmp_path / "table.json").read_text())
     assert [one["label"] for one in scores["scores"]] == ["base", "p"]
@@ -175,7 +176,7 @@ def test_the_files_of_a_comparison_hold_every_flight_and_every_score(tmp_path):
 
 def test_the_picture_is_drawn_for_any_flights(tmp_path):
     rows = [row("a", "base"), failed_row("a", "p"), row("b", "q", violations=1)]
-    assert "coverage-energy.png" in write(Comparison.of(rows, 3, "base", "c", "j"), tmp_path)
+    assert "coverage-energy.png" in Comparison.of(rows, 3, "base", "c", "j").write(tmp_path)
     assert (tmp_path / "coverage-energy.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -212,27 +213,27 @@ def kept(rows, directory):
     with opened(directory, {"command": "compare"}, Row) as store:
         for one in rows:
             store.add(one)
-    write(Comparison.of(rows, 3, rows[0].label, "c", "j"), directory)
+    Comparison.of(rows, 3, rows[0].label, "c", "j").write(directory)
 
 
 def test_what_is_published_is_read_again(tmp_path):
     rows = [row("a", "base"), failed_row("a", "p"), row("b", "base", energy_Wh=None)]
     kept(rows, tmp_path)
-    assert published(tmp_path) == (rows, "base")
+    assert read_comparison(tmp_path) == (rows, "base")
 
 
 def test_what_is_no_comparison_of_this_version_is_refused(tmp_path):
     with pytest.raises(InputError, match="holds no flights that can be read"):
-        published(tmp_path)
+        read_comparison(tmp_path)
     kept([row("a", "base")], tmp_path)
     table = tmp_path / "table.json"
     table.write_text('{"reference": "nobody"}')
     with pytest.raises(InputError, match="'nobody' has no flight"):
-        published(tmp_path)
+        read_comparison(tmp_path)
     for text in ("{", "[]", "{}"):
         table.write_text(text)
         with pytest.raises(InputError, match=r"table\.json: cannot be read"):
-            published(tmp_path)
+            read_comparison(tmp_path)
 
 
 def test_the_return_is_that_of_all_flights_there_are_and_says_of_how_many():
@@ -245,8 +246,8 @@ def test_the_return_is_that_of_all_flights_there_are_and_says_of_how_many():
     one = by_label(rows, "p")["p"]
     assert (one.episode_return.value, one.episode_return.n) == (20.0, 2)
     assert one.flat()["episode_return_high"] == 30.0
-    headings, (cells,) = outcome_cells([one])
-    assert cells[headings.index("return")] == "20.0 [10.0, 30.0]"
+    headings, (line,) = cells([one], "outcome")
+    assert line[headings.index("return")] == "20.0 [10.0, 30.0]"
 
 
 def test_a_note_names_the_planners_that_fly_alike_with_every_seed():
@@ -257,3 +258,34 @@ def test_a_note_names_the_planners_that_fly_alike_with_every_seed():
     ]
     assert notes(rows, "same")[-1].endswith("one suffices: same.")
     assert not any("suffices" in line for line in notes(rows[:1], "same"))
+
+
+@pytest.mark.parametrize(
+    ("figure", "value", "cell"),
+    [
+        (Figure("spare_Wh", float, len, ""), 2.0, "2.00 [1.00, 3.00]"),
+        (Figure("spare_share", float, len, ""), 200.0, "200.0 [100.0, 300.0]"),
+        (Figure("spare_Wh", float, len, "", over="total"), 4.0, "4.00"),
+        (Figure("spare_Wh", float, len, "", over="most", digits=0), 3.0, "3"),
+        (Figure("spare_Wh", float, len, "", over="least"), 1.0, "1.00"),
+        (Figure("wait_s", float, len, "", over="average", unit="ms"), 2000.0, "2000"),
+        (Figure("spare_uas", int, len, "", over="total"), 4, "4"),
+        (Figure("spare_uas", int, len, "", over="median"), 2.0, "2.0"),
+        (Figure("spare", bool, len, ""), 4, "4/2"),
+    ],
+)
+def test_a_figure_is_summed_up_over_flights_as_it_says(figure, value, cell):
+    class Flown:
+        status = FLOWN
+
+        def __init__(self, found):
+            self.found = found
+
+        def __getattr__(self, name):
+            return self.found
+
+    column = _of_figure(figure)
+    rows = [[Flown(1.0), Flown(3.0)]]
+    found = column.of(Flights(rows, rows, "seeds", "seeds", {}))
+    assert getattr(found, "value", found) == value
+    assert column.cell(Scores("p", {column.name: found, "flights": 2})) == cell

@@ -9,17 +9,12 @@ from hypothesis import strategies as st
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, rollout
-from uas_coverage_env.leaderboard import (
-    SETS,
-    TIMES,
-    Sweep,
-    planner_specs_of,
-    scenarios_of,
-    source_of,
-)
+from uas_coverage_env.leaderboard import Sweep, planner_specs_of, scenarios_of
 from uas_coverage_env.leaderboard.flying import fly, kept_as
 from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
-from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
+from uas_coverage_env.leaderboard.row import TIMES
+from uas_coverage_env.leaderboard.scenario_sets import SETS, scenario_hash
+from uas_coverage_env.leaderboard.sweep import source_of
 from uas_coverage_env.runner.store import difference
 from uas_coverage_env.scenario import load_scenario
 

@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-from uas_coverage_env.vehicle import DOD, PSI
+from uas_coverage_env.vehicle.layout import DOD, PSI
 
 
 class Ceiling:

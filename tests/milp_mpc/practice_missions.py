@@ -6,11 +6,12 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort
 
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import LIFT, TAU_X, TAU_Y, TAU_Z
-from uas_coverage_env.world import OUTCOME_DTYPE, Wrench
+from uas_coverage_env.vehicle.layout import LIFT, TAU_X, TAU_Y, TAU_Z
+from uas_coverage_env.world import Wrench
 
 LITTLE = Effort(deterministic=True, teams=4)
 

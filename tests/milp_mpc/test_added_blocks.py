@@ -9,12 +9,13 @@ import pytest
 from added_blocks import Apart, Ceiling, Doubled, Early, Floor, OneLevel, Thrifty, Turned
 from practice_missions import fly, mission
 from toy_problems import TO_OPTIMALITY, flown, planned, state, toy
-from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc import MilpMpc
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
+from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal
-from uas_coverage_baselines.milp_mpc.model.blocks import Geofence, TargetDistance
+from uas_coverage_baselines.milp_mpc.model.blocks import InsideGeofence, TargetDistance
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
@@ -84,11 +85,11 @@ def test_a_formulation_replaces_blocks_and_leaves_out_none():
 
 
 def test_a_subclass_of_a_block_is_not_replaced_and_a_block_left_out_is_not_missed(grounded):
-    class Inner(Geofence):
+    class Inner(InsideGeofence):
         def add_to(self, milp, v, problem):
             super().add_to(milp, v, dataclasses.replace(problem, fence_margin_m=20.0))
 
-    inner = tuple(Inner() if isinstance(block, Geofence) else block for block in OCP)
+    inner = tuple(Inner() if isinstance(block, InsideGeofence) else block for block in OCP)
     program = RestrictedMilp(grounded, inner)
     north = program.variables.position[:, 1:, 0]
     assert (program.built.lower[north] >= 20.0 - 1e-9).all()

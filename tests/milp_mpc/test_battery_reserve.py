@@ -12,8 +12,8 @@ from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.model.blocks import BatteryReserve, Capabilities, Dynamics
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
     cost_per_s,
-    seconds_home,
     short_s,
+    straight_seconds_home,
 )
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
@@ -22,15 +22,11 @@ from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, wr
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
-from uas_coverage_env.geometry import inner_factor
+from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.planning.reserves import BRAKING_S
-from uas_coverage_env.vehicle import (
-    DOD,
-    compile_vehicle,
-    dod_per_s,
-    load_vehicle,
-    seconds_to_land,
-)
+from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
+from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.vehicle.range import dod_per_s, seconds_to_land
 
 OPTIMAL = SolverLimits(relative_gap=1e-6, absolute_gap=1e-5)
 SKY = box((-2000.0, -2000.0, -100.0), (2000.0, 2000.0, 0.0))
@@ -82,7 +78,7 @@ def test_the_rows_say_what_a_flight_comes_home_with():
 def test_the_way_home_is_never_estimated_shorter_by_the_rows_than_by_the_modes(away):
     x = state(np.array(HOME[0]) + away, dod=0.3)
     problem = toy(x, fence=SKY, home_m=HOME)
-    way_s = seconds_home(S500, np.array(away))
+    way_s = straight_seconds_home(S500, np.array(away))
     spent_s = (0.3 - 0.75) / dod_per_s(S500, 0.75)
     assert short_s(problem, 0, x, allowance=False) >= way_s + spent_s - 1e-6
     assert short_s(problem, 0, x, allowance=False) <= 1.1 * way_s + spent_s
@@ -93,7 +89,7 @@ def test_the_way_home_is_never_estimated_shorter_by_the_rows_than_by_the_modes(a
 def test_the_reserve_is_no_shorter_than_the_calibrated_way_home_from_a_hover(vehicle, height_m):
     record = compile_vehicle(vehicle, 1.0)[()]
     for way_m in np.arange(50.0, 800.0, 50.0):
-        allowed_s = seconds_home(vehicle, np.array([way_m, 0.0, -height_m])) + BRAKING_S
+        allowed_s = straight_seconds_home(vehicle, np.array([way_m, 0.0, -height_m])) + BRAKING_S
         assert allowed_s > seconds_to_land(record, way_m, 0.0, height_m, -np.inf, way_m, 0.0)
 
 

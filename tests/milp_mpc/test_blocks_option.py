@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 from practice_missions import mission
-from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc import MilpMpc
+from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model import named_blocks
 from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon

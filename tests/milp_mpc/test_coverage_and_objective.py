@@ -10,8 +10,10 @@ from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
-from uas_coverage_env.geometry import cylinder_faces, inner_factor, sphere_faces
-from uas_coverage_env.vehicle import DELTA_THRUST, DOD, LIFT, PSI, WX, WZ, linear_model
+from uas_coverage_env.geometry import cylinder_faces, sphere_faces
+from uas_coverage_env.geometry.round_shapes import inner_factor
+from uas_coverage_env.vehicle import linear_model
+from uas_coverage_env.vehicle.layout import DELTA_THRUST, DOD, LIFT, PSI, WX, WZ
 
 MIDDLE = np.array([100.0, 100.0, -25.0])
 FAR = state((5.0, 5.0, -5.0))

@@ -16,12 +16,13 @@ from uas_coverage_baselines.milp_mpc.search import team_search
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import NARROW, WIDE, RestrictedMilp
-from uas_coverage_baselines.milp_mpc.search.trajectories import Trajectory, teams
-from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
+from uas_coverage_baselines.milp_mpc.search.trajectories import PlannedTrajectory, teams
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 
 from uas_coverage_env.geometry import sphere_faces
-from uas_coverage_env.vehicle import PHI, THETA, VX, WY
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, WY
 
 BY_NODES = Effort(deterministic=True, teams=4)
 BY_TEAM = dataclasses.replace(BY_NODES, joint=None)
@@ -132,7 +133,7 @@ def test_the_joint_program_is_written_in_the_tightest_form(problem, monkeypatch)
 
 def test_a_share_of_the_time_is_the_joint_programs_once_each_uas_has_a_plan(problem, by_nodes):
     search = team_search.TeamSearch(problem, WITH_TIME, time.perf_counter())
-    search.formulate(range(2))
+    search.prepare(range(2))
     alone = {key: getattr(by_nodes, key)[:1] for key in ("x", "u", "covers")}
     search.collect(0, [dataclasses.replace(by_nodes, names=by_nodes.names[:1], **alone)])
     assert not search.joint_is_due(0), "there is time enough"
@@ -224,7 +225,7 @@ def test_a_uas_that_gets_no_plan_flies_the_rest_of_its_backup(problem, by_nodes,
 def test_where_no_team_holds_a_uas_may_leave_its_fallback_plan(problem, by_nodes, monkeypatch):
     monkeypatch.setattr(team_search, "teams", lambda problem, pools, keep: [])
     search = team_search.TeamSearch(problem, BY_NODES, time.perf_counter())
-    search.formulate(range(2))
+    search.prepare(range(2))
     for uas in range(2):
         alone = dataclasses.replace(
             by_nodes,
@@ -426,7 +427,7 @@ def test_flights_that_come_too_close_make_no_good_team():
 
 
 def _as_flight(x):
-    return Trajectory(x[:, :3], np.zeros(0, np.int64), 0.0, 0.0)
+    return PlannedTrajectory(x[:, :3], np.zeros(0, np.int64), 0.0, 0.0)
 
 
 @pytest.mark.parametrize("sides", [0, 3, 6, 10])

@@ -11,17 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy
-from uas_coverage_baselines.milp_mpc.model.blocks import coverable
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.blocks.separation import from_obstacles
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.problem import Target, TourSegment, WayHome, Weights
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems, write_problems
-from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS, solve_lazily
+from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.model.reductions.bounds import rows_as_bounds
 from uas_coverage_baselines.milp_mpc.model.reductions.elimination import (
     flown_states,
     motion_variables,
 )
+from uas_coverage_baselines.milp_mpc.model.reductions.lazy import solve_lazily
 from uas_coverage_baselines.milp_mpc.model.reductions.travel import (
     cliques,
     exclusive,

@@ -13,7 +13,8 @@ from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.vehicle import VY, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import VY
 
 S500 = load_vehicle("s500_v2")
 KEEP_OUT_M = 8.0 + 25.0 + 0.36  # of the village's helicopter

@@ -10,7 +10,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
     CornerCutting,
     Coverage,
     Dynamics,
-    Geofence,
+    InsideGeofence,
     MovingObstacles,
     Obstacles,
     Slack,
@@ -87,7 +87,7 @@ def test_collision(request):
 
 
 def test_geofence(request):
-    milp, _ = written(toy(CALM), Geofence())
+    milp, _ = written(toy(CALM), InsideGeofence())
     heading = """
         Geofence, eq. (OCP_5) by eq. (const_CS_in): d_h(p(n)) <= delta_G = -0.5 for each face of
         the box 0..200, 0..200, -50..0.

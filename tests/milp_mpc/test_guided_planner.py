@@ -10,11 +10,13 @@ from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
-from uas_coverage_env.flight import accomplished, load_planner, rollout
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.entities.state import LOST
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.scenario import Execution, generate_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import HOME, LOST
 
 REPEATABLE = GuidedOptions(deterministic=True, horizon=10)
 PLACES = [((60.0, 40.0 + 25.0 * k, -10.0), 8.0) for k in range(5)]

@@ -13,9 +13,10 @@ from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 
 from uas_coverage_env import World, generate_scenario, rollout
-from uas_coverage_env.features import constant_wind, wind_velocity_mps
+from uas_coverage_env.features import constant_wind
+from uas_coverage_env.features.steady_wind import wind_velocity_mps
 from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.vehicle import TAU_X, TAU_Y, VX, VY, X, Y, Z
+from uas_coverage_env.vehicle.layout import TAU_X, TAU_Y, VX, VY, X, Y, Z
 from uas_coverage_env.world import Velocity
 
 FIELD = meadow(((100.0, 100.0, -30.0),), waypoints=(waypoint((150.0, 100.0, -30.0)),))

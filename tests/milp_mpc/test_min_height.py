@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from toy_problems import S500, box, feasible, flight, flown, state, toy, written
-from uas_coverage_baselines.milp_mpc import MilpMpc, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc import MilpMpc
+from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model.blocks import MinHeight
 from uas_coverage_baselines.milp_mpc.model.height import least_heights_m, too_low_m
 from uas_coverage_baselines.milp_mpc.model.problem import Plan

@@ -26,7 +26,7 @@ HOMES = {
 NOT_IN_THE_PAPER = {"separation", "time_to_go", "min_height"}
 # which classes are written by which formulation of Sec. III-B
 FORMULATIONS = {
-    "const_CS_in": {"Geofence"},
+    "const_CS_in": {"InsideGeofence"},
     "const_CS_out": {"Obstacles"},
     "const_Vec_ub": {"BatteryReserve", "Capabilities", "Coverage", "TargetDistance", "TimeToGo"},
     "const_Vec_lb": {"Collision", "MovingObstacles"},

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from toy_problems import TO_OPTIMALITY, state, toy
-from uas_coverage_baselines.milp_mpc import PAPER_OCP, MilpMpcPaper, Weights, formulate
-from uas_coverage_baselines.milp_mpc.model.problem import Target
+from uas_coverage_baselines.milp_mpc import PAPER_OCP, MilpMpcPaper, formulate
+from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.vehicle import load_vehicle, return_threshold
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.params import return_threshold
 
 
 def test_the_village_and_the_options_have_the_numbers_of_the_papers_table():

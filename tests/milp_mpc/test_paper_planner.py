@@ -13,14 +13,17 @@ from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.blocks import Capabilities, Dynamics
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
-from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Flight, accomplished, load_planner, rollout
+from uas_coverage_env.flight import Flight, load_planner, rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VX, VY, return_threshold
+from uas_coverage_env.vehicle.layout import VX, VY
+from uas_coverage_env.vehicle.params import return_threshold
 from uas_coverage_env.world import Velocity, Wrench
 
 FLOWN = read_problems(Path(__file__).parents[2] / "benchmarks" / "village_decisions.json")

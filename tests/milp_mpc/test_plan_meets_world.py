@@ -12,7 +12,7 @@ from uas_coverage_baselines.milp_mpc.search.decision import decide
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DELTA_THRUST
+from uas_coverage_env.vehicle.layout import DELTA_THRUST
 from uas_coverage_env.world import Velocity
 
 HORIZON = 10

@@ -11,7 +11,8 @@ from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, backup_tr
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
-from uas_coverage_env.vehicle import DOD, PHI, THETA, VX, VZ, WX, WZ, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import DOD, PHI, THETA, VX, VZ, WX, WZ
 
 HEXACOPTER = load_vehicle("hexacopter")
 START = state((60.0, 60.0, -10.0), (5.0, 0.0, 0.0))

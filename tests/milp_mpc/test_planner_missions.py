@@ -6,11 +6,12 @@ from practice_missions import fly, mission, planner, with_uas
 from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
-from uas_coverage_env.flight import accomplished, load_planner, rollout
+from uas_coverage_env.entities.state import LANDED
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VZ
-from uas_coverage_env.world import LANDED
+from uas_coverage_env.vehicle.layout import VZ
 
 
 def commands_of(scenario, decisions, **options):

@@ -7,7 +7,8 @@ from uas_coverage_baselines.milp_mpc.model.blocks import Capabilities, Dynamics
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NORMS
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
-from uas_coverage_env.geometry import ConvexPolytope, inner_factor
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.round_shapes import inner_factor
 
 OPEN_SKY = ConvexPolytope.from_points(
     [(x, y, z) for x in (-1e3, 1e3) for y in (-1e3, 1e3) for z in (-1e3, 1e3)]

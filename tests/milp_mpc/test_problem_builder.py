@@ -12,9 +12,10 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, Target, Weights
 from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
+from uas_coverage_env.entities.state import LANDED
 from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import LANDED, Velocity
+from uas_coverage_env.world import Velocity
 
 PLACES = [((60.0, 50.0, -6.0), 8.0), ((50.0, 75.0, -6.0), 8.0), ((190.0, 190.0, -20.0), 8.0)]
 STARTS = [(50.0, 50.0, -1.0), (50.0, 90.0, -1.0)]

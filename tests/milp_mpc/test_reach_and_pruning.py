@@ -5,14 +5,18 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, TO_OPTIMALITY, box, flight, moving, state, toy, written
-from uas_coverage_baselines.milp_mpc.model.blocks import Capabilities, Dynamics, coverable
+from uas_coverage_baselines.milp_mpc.model.blocks import Capabilities, Dynamics
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Target
-from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 
-from uas_coverage_env.geometry import closed_cylinder_faces, sphere_faces
-from uas_coverage_env.vehicle import VX, VY, load_vehicle
+from uas_coverage_env.geometry import sphere_faces
+from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import VX, VY
 
 HEXACOPTER = load_vehicle("hexacopter")
 OPEN_SKY = box((-1000.0, -1000.0, -1000.0), (1000.0, 1000.0, 1000.0))

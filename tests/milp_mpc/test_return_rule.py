@@ -7,9 +7,12 @@ from hypothesis import strategies as st
 from practice_missions import corners, mission, obstacle
 from uas_coverage_baselines.milp_mpc.return_rule import ReturnRule
 
-from uas_coverage_env.flight import load_planner, rollout, summary
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.mission import MissionBrief, Ways
-from uas_coverage_env.vehicle import dod_per_s, load_vehicle, return_threshold
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.params import return_threshold
+from uas_coverage_env.vehicle.range import dod_per_s
 
 S500 = load_vehicle("s500_v2")
 START = (50.0, 50.0, -1.0)

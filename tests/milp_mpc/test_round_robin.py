@@ -12,7 +12,8 @@ from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 
-from uas_coverage_env.flight import accomplished, rollout
+from uas_coverage_env.flight import rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.vehicle import load_vehicle
 
 ONE = Effort(deterministic=True, teams=1, at_once=1)

@@ -12,12 +12,9 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
     Obstacles,
 )
 
-from uas_coverage_env.geometry import (
-    ConvexPolytope,
-    closed_cylinder_faces,
-    cylinder_clearance,
-    segment_clearance,
-)
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
+from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
 
 ROUNDING_M = 1e-5
 FAR = state((5.0, 5.0, -5.0))

@@ -14,15 +14,8 @@ from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
-from uas_coverage_baselines.milp_mpc.solvers import (
-    SOLVERS,
-    TOLERANCE,
-    SolverError,
-    SolverLimits,
-    SolveStatus,
-    interface,
-    solver_named,
-)
+from uas_coverage_baselines.milp_mpc.solvers import SOLVERS, SolverLimits, interface, solver_named
+from uas_coverage_baselines.milp_mpc.solvers.interface import TOLERANCE, SolverError, SolveStatus
 
 from uas_coverage_env import InputError
 from uas_coverage_env.cli import main

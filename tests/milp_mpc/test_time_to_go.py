@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from golden_lp import compare, readable
 from toy_problems import FIELD, S500, TO_OPTIMALITY, state, toy, written
-from uas_coverage_baselines.milp_mpc.model.blocks import TimeToGo
+from uas_coverage_baselines.milp_mpc.model.blocks.time_to_go import TimeToGo
 from uas_coverage_baselines.milp_mpc.model.problem import TourSegment, Trajectories
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve

@@ -17,7 +17,7 @@ from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_env import generate_scenario
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.scenario import with_disturbances
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle.layout import VX, VZ
 from uas_coverage_env.world import GoTo, Velocity, Wrench
 
 WALL = box((60.0, 0.0, -50.0), (70.0, 200.0, 0.0))

@@ -9,20 +9,11 @@ from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, Plan
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
-from uas_coverage_env.geometry import ConvexPolytope, inner_factor
-from uas_coverage_env.vehicle import (
-    DOD,
-    N_INPUTS,
-    N_STATES,
-    VX,
-    VZ,
-    compile_vehicle,
-    linear_model,
-    load_vehicle,
-    lpv_step,
-    reseed_reference,
-    velocity_climb_wrench,
-)
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.round_shapes import inner_factor
+from uas_coverage_env.vehicle import compile_vehicle, linear_model, load_vehicle, lpv_step
+from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
+from uas_coverage_env.vehicle.layout import DOD, N_INPUTS, N_STATES, VX, VZ
 
 S500 = load_vehicle("s500_v2")
 TO_OPTIMALITY = SolverLimits(relative_gap=1e-9, absolute_gap=1e-7)

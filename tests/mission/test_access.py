@@ -6,7 +6,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.mission import Access, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.access import Access
 
 OPEN_GAP_M = 2.0 * (0.36 + 2.0 + 1.0)  # radius, safe distance and the margin of routes
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hard_missions import TOWER, mission
 
-from uas_coverage_env.mission import Attempts, first_sight, with_free_aims
-from uas_coverage_env.mission.attempts import PATIENCE_S
-from uas_coverage_env.world import HOME
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.mission import first_sight
+from uas_coverage_env.mission.approach import with_free_aims
+from uas_coverage_env.mission.attempts import PATIENCE_S, Attempts
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import numpy as np
 from small_worlds import meadow, waypoint
 
 from uas_coverage_env import MissionBrief, World
-from uas_coverage_env.mission import MEAN_HEIGHT_M, LearntWind
+from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind
 from uas_coverage_env.scenario import Wind
-from uas_coverage_env.vehicle import Z
+from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world import Velocity
 
 FIELD = meadow(((100.0, 100.0, -30.0),), waypoints=(waypoint((150.0, 100.0, -30.0)),))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from uas_coverage_env.files.strict_toml import parse
-from uas_coverage_env.mission import Legs, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.scenario import Scenario
 
 

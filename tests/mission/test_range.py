@@ -9,7 +9,8 @@ from scipy.optimize import brentq
 
 from uas_coverage_env import MissionBrief, World, load_scenario
 from uas_coverage_env.mission import Range
-from uas_coverage_env.vehicle import DOD, VX, VY, Z, dod_per_s
+from uas_coverage_env.vehicle.layout import DOD, VX, VY, Z
+from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import Velocity
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))

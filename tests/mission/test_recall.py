@@ -7,9 +7,10 @@ import pytest
 from small_worlds import meadow
 
 from uas_coverage_env import MissionBrief
-from uas_coverage_env.mission import Recall, WorldView, first_sight
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import LANDED
+from uas_coverage_env.entities.state import LANDED
+from uas_coverage_env.mission import WorldView, first_sight
+from uas_coverage_env.mission.recall import Recall
+from uas_coverage_env.vehicle.layout import DOD
 
 STARTS_M = ((20.0, 20.0, -1.0), (60.0, 20.0, -1.0))
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hard_missions import mission
 
+from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.mission import Ways
 from uas_coverage_env.mission.ways import SHADED_S
-from uas_coverage_env.world import HOME
 
 BEHIND = ((20.0, 80.0, -10.0), 5.0)
 WALL = ((0.0, 40.0, -50.0), (150.0, 44.0, 0.0))

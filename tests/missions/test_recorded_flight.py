@@ -11,11 +11,13 @@ from importlib import import_module
 from pathlib import Path
 from zipfile import ZipFile
 
-import independent_check
 import numpy as np
 import pytest
 
-from uas_coverage_env.flight import Flight, accomplished, summary
+from uas_coverage_env import independent_check
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.replay.flight_data import flight_data
 from uas_coverage_env.replay.recorded import archive_of, unpack_recorded, write_recorded_page
 from uas_coverage_env.scenario import load_scenario

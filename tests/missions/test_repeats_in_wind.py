@@ -3,7 +3,7 @@
 import pytest
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
-from uas_coverage_env.flight import accomplished, coverage, home
+from uas_coverage_env.flight.metrics import accomplished, coverage, home
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.world import GoTo, Velocity
 

@@ -3,14 +3,13 @@
 import dataclasses
 import time
 
-import independent_check
 import numpy as np
 import pytest
 from lively_missions import with_balloon
-from uas_coverage_baselines.milp_mpc.solvers import Solution, SolveStatus, highs
-from uas_coverage_baselines.milp_mpc.solvers.interface import confirmed
+from uas_coverage_baselines.milp_mpc.solvers import highs
+from uas_coverage_baselines.milp_mpc.solvers.interface import Solution, SolveStatus, confirmed
 
-from uas_coverage_env import generate_scenario, load_planner, rollout
+from uas_coverage_env import generate_scenario, independent_check, load_planner, rollout
 
 TOGETHER = {"deterministic": "true", "horizon": "8", "teams": "1", "threads": "1"}
 QUICK = {**TOGETHER, "at_once": "1"}  # UAS are planned in turns: no joint program, a third the work

@@ -3,18 +3,19 @@
 import json
 from functools import partial
 
-import independent_check
 import numpy as np
 import pytest
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
 
-from uas_coverage_env import Flight, generate_scenario, load_scenario, rollout
+from uas_coverage_env import Flight, generate_scenario, independent_check, load_scenario, rollout
 from uas_coverage_env.bound import MissionBound
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, energy_Wh, packs_used, rest_of, summary
+from uas_coverage_env.flight import rest_of
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh, packs_used
 from uas_coverage_env.flight.record import MODES
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.replay.flight_data import flight_data

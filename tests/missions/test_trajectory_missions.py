@@ -1,12 +1,11 @@
 """Whole missions of `trajectory`, judged by a checker that shares nothing with the world."""
 
-import independent_check
 import pytest
 from lively_missions import with_balloon
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
-from uas_coverage_env import rollout
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env import independent_check, rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import generate_scenario
 
 QUICK = {"orders": 1, "moves": 20_000, "programs": 60}

@@ -14,12 +14,14 @@ from uas_coverage_baselines.milp_mpc import moving_horizon
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight import load_planner
-from uas_coverage_env.mission import Attempts, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, compile_vehicle
-from uas_coverage_env.world import FLYING, LANDED
+from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.layout import DOD
 
 WALLS = Path(__file__).parent / "walls"
 CHEAP = {

@@ -1,8 +1,8 @@
 """A small ArduCopter for the tests: it flies a .waypoints with its .param, and fails as it is told.
 
 In our own words after ArduCopter 4.7's mode_auto.cpp, mode_rtl.cpp, mode_smart_rtl.cpp, events.cpp
-and AP_BattMonitor_Backend.cpp. On straight legs it flies as `mission.leg_model` has it, which is
-held against recorded flights elsewhere.
+and AP_BattMonitor_Backend.cpp. On straight legs it flies as
+`planning.execution.leg_model` has it, which is held against recorded flights elsewhere.
 """
 
 import warnings
@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from pymavlink import mavwp
 
-from uas_coverage_env.mission.leg_model import DT_S, Autopilot, Followed, follow
+from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, Followed, follow
 from uas_coverage_env.vehicle.battery import steady_current_A
 from uas_coverage_env.vehicle.range import level_power_W
 

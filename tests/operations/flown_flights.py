@@ -6,7 +6,7 @@ import numpy as np
 
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.operations import LocalFrame, flown_flight
-from uas_coverage_env.operations.logs import Logged
+from uas_coverage_env.operations.logs.logged import Logged
 from uas_coverage_env.scenario import Place, Scenario, load_scenario
 
 PLACE = Place(latitude_deg=47.5, longitude_deg=19.05)

@@ -14,7 +14,8 @@ pytest.importorskip("pyproj")
 
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.operations import LocalFrame
-from uas_coverage_env.operations.stream import StreamOptions, stream_flight, timeline_of
+from uas_coverage_env.operations.stream import StreamOptions, stream_flight
+from uas_coverage_env.operations.stream.timeline import timeline_of
 from uas_coverage_env.scenario import Execution, Place
 
 HERE = Place(latitude_deg=47.0, longitude_deg=8.0)

@@ -12,11 +12,12 @@ from pymavlink import mavwp
 from qgc_loader import problems
 
 from uas_coverage_env import load_planner, rollout
-from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
-from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
-from uas_coverage_env.operations.asked import not_as_asked
-from uas_coverage_env.operations.frame import LocalFrame
-from uas_coverage_env.operations.tracks import make_tracks
+from uas_coverage_env.operations import ExportOptions, make_export
+from uas_coverage_env.operations.geodesy import LocalFrame
+from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
+from uas_coverage_env.operations.mission_export.tracks import Tolerances
+from uas_coverage_env.operations.mission_export.waypoint_requirements import not_as_asked
+from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, follow
 from uas_coverage_env.scenario import Execution, Place, load_scenario
 
 PLACE = Place(latitude_deg=60.5, longitude_deg=26.9)

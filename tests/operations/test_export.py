@@ -23,10 +23,11 @@ from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.features.wind import Wind
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations import ExportOptions, Tolerances, make_export
-from uas_coverage_env.operations.corners import cut_path, distances_m
-from uas_coverage_env.operations.formats import ENDINGS, FORMATS
-from uas_coverage_env.operations.tracks import make_tracks
+from uas_coverage_env.operations import ExportOptions, make_export
+from uas_coverage_env.operations.mission_export.formats import ENDINGS, FORMATS
+from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
+from uas_coverage_env.operations.mission_export.tracks import Tolerances
+from uas_coverage_env.operations.path_geometry import cut_path, distances_m
 from uas_coverage_env.scenario import Place, load_scenario
 
 TOLERANCES = Tolerances(2.0, 2.0)

@@ -23,8 +23,6 @@ from uas_coverage_env import rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import fly_sorties
-from uas_coverage_env.mission.lateness import Timed, pairs_of
-from uas_coverage_env.mission.separation import ready_s
 from uas_coverage_env.operations import (
     ExportOptions,
     LocalFrame,
@@ -34,6 +32,8 @@ from uas_coverage_env.operations import (
 )
 from uas_coverage_env.operations.sorties import sorties_of
 from uas_coverage_env.operations.stream import RealClock, StreamOptions, stream_flight
+from uas_coverage_env.planning.execution.lateness import Timed, pairs_of
+from uas_coverage_env.planning.execution.separation import ready_s
 from uas_coverage_env.scenario import Place
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.world import GoTo

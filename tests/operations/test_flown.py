@@ -10,7 +10,8 @@ pytest.importorskip("pyproj")
 from flown_flights import FAR_M, FLIES_S, WAYPOINTS_M, judged, logged, places_m, said
 
 from uas_coverage_env import Flight
-from uas_coverage_env.flight import covered_at, energy_Wh
+from uas_coverage_env.flight import covered_at
+from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.operations.logs.logged import Said, Span
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 pytest.importorskip("pyproj")
 from geographiclib.geodesic import Geodesic
 
-from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.scenario import Place
 
 MOST_M = 0.01

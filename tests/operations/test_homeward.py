@@ -8,9 +8,10 @@ pytest.importorskip("pyproj")
 from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env import rollout
-from uas_coverage_env.mission.leg_model import DT_S, Autopilot, Followed
-from uas_coverage_env.operations.homeward import RETRACE, RETURN, homeward
-from uas_coverage_env.operations.tracks import Tolerances, make_tracks
+from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
+from uas_coverage_env.operations.mission_export.return_paths import RETRACE, RETURN, return_path
+from uas_coverage_env.operations.mission_export.tracks import Tolerances
+from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, Followed
 
 START_M = (20.0, 100.0, -1.0)
 BY = Autopilot(speed_mps=12.0)
@@ -38,7 +39,7 @@ def path_of(corners_m, speed_mps):
 def way_home(track, followed, *obstacles, **options):
     scenario = meadow((START_M,), obstacles=obstacles)
     told = {"holds_s": [0.0] * (len(followed.corner_s) - 1), "begins_s": 0.0, "others": ()}
-    return homeward(scenario, track, followed, BY, **told, **options)
+    return return_path(scenario, track, followed, BY, **told, **options)
 
 
 NORTH = [(20.0, 100.0, -20.0), (140.0, 100.0, -20.0)]

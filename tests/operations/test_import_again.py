@@ -6,7 +6,7 @@ pytest.importorskip("shapely")
 from drawings import HOME, SQUARE, collection, feature, imported, refused
 
 from uas_coverage_env import load_planner, rollout
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import warnings
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

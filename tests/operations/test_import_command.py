@@ -20,11 +20,16 @@ from drawings import HIGH, HOME, SQUARE, collection, feature, imported, refused
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, TakeOff, read_drawings
-from uas_coverage_env.operations.drawing import MOST_CORNERS
-from uas_coverage_env.operations.tags import GUESSED_OTHER_M, STOREY_M, height_m, standing_of
+from uas_coverage_env.operations.area_import.drawn_areas import MOST_CORNERS
+from uas_coverage_env.operations.area_import.osm_tags import (
+    GUESSED_OTHER_M,
+    STOREY_M,
+    height_m,
+    standing_of,
+)
 from uas_coverage_env.scenario import load_scenario, warnings
 
-EXAMPLES = Path(str(resources.files("uas_coverage_env.operations"))) / "examples"
+EXAMPLES = Path(str(resources.files("uas_coverage_env.operations.area_import"))) / "examples"
 
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -77,7 +82,7 @@ def test_the_shipped_town_is_what_import_makes_of_it():
 
 def test_the_check_of_a_scenario_says_where_it_is(capsys):
     imported("karhula")
-    assert main(["scenarios", "check", "out.toml"]) == 0
+    assert main(["scenario", "check", "out.toml"]) == 0
     assert "place      60.5246000, 26.9467500, 0 m above sea level\n" in capsys.readouterr().out
 
 

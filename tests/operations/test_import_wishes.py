@@ -7,7 +7,8 @@ pytest.importorskip("shapely")
 from drawings import HOME, SQUARE, collection, feature, imported, refused
 
 from uas_coverage_env import load_planner, rollout
-from uas_coverage_env.flight import accomplished, seen_ground
+from uas_coverage_env.flight import seen_ground
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.operations import load_camera
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

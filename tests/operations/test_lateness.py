@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 pytest.importorskip("pyproj")
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.mission.lateness import Timed, pairs_of
-from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
-from uas_coverage_env.operations.apart import check_slack
-from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.geodesy import LocalFrame
+from uas_coverage_env.operations.mission_export.scheduling import check_slack
+from uas_coverage_env.planning.execution.lateness import Timed, pairs_of
+from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, follow
 from uas_coverage_env.scenario import Place, load_scenario
 
 FIELD = load_scenario("open_field")

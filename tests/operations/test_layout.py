@@ -10,9 +10,9 @@ import shapely
 from shapely.geometry import Point, Polygon, box
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.cameras import camera_names, load_camera
+from uas_coverage_env.operations.area_import.cameras import camera_names, load_camera
+from uas_coverage_env.operations.area_import.waypoint_layout import lay_waypoints
 from uas_coverage_env.operations.convex import convex_pieces, few_corners
-from uas_coverage_env.operations.layout import lay_waypoints
 
 EXAMPLES = settings(max_examples=60, deadline=None, derandomize=True)
 EVERYWHERE = box(-5_000, -5_000, 5_000, 5_000)

@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from recorded_flights import NAMES as FLIGHTS
 from recorded_flights import modelled, recorded
 
-from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
-from uas_coverage_env.operations.corners import cut_path, distances_m
+from uas_coverage_env.operations.path_geometry import cut_path, distances_m
+from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, follow
 
 EXAMPLES = settings(max_examples=40, deadline=None, derandomize=True)
 

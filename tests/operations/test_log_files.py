@@ -18,7 +18,7 @@ from flown_flights import FLIES_S, FRAME, WAYPOINTS_M, geodetic, judged, places_
 from uas_coverage_env import Flight
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import energy_Wh
+from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.flight.record import LANDED
 from uas_coverage_env.operations import flown_flight, read_log
 
@@ -197,13 +197,13 @@ def test_vehicles_of_one_link_are_chosen_by_their_systems(tmp_path, plan_at, cap
     path = tmp_path / "link.tlog"
     tlog(path, TIMES_S, both, systems=(1, 7), armed=ARMED)
     rest = ("--plan", plan_at, "--out", str(tmp_path / "out"))
-    assert main(["import-log", f"uas_1={path}", *rest]) == 2
+    assert main(["log", f"uas_1={path}", *rest]) == 2
     err = capsys.readouterr().err
     assert "holds several vehicles (systems 1, 7); choose one for each UAS" in err
     assert err.count("\n") == 1
-    assert main(["import-log", f"uas_1={path}:3", *rest]) == 2
+    assert main(["log", f"uas_1={path}:3", *rest]) == 2
     assert "has no vehicle of system 3; it has 1, 7" in capsys.readouterr().err
-    assert main(["import-log", f"uas_1={path}:1", f"uas_2={path}:7", *rest]) == 0
+    assert main(["log", f"uas_1={path}:1", f"uas_2={path}:7", *rest]) == 0
     flight = Flight.load(tmp_path / "out")
     assert (flight.mode[-1] == LANDED).all()
     assert flight.x[30, :, 1] == pytest.approx([0.0, 40.0], abs=0.1)
@@ -214,7 +214,7 @@ def test_the_flight_of_each_log_is_chosen_by_its_number(tmp_path, plan_at, capsy
     times_s = np.append(TIMES_S, TIMES_S + 100.0)
     said = [(100.0 + t, "EV", n) for t, n in zip(ARMED, (10, 11), strict=True)]
     bin_log(tmp_path / "uas_1.bin", times_s, twice, armed=ARMED, said=said)
-    arguments = ["import-log", str(tmp_path / "uas_1.bin"), "--plan", plan_at]
+    arguments = ["log", str(tmp_path / "uas_1.bin"), "--plan", plan_at]
     assert main([*arguments, "--out", str(tmp_path / "none")]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
@@ -318,7 +318,7 @@ def test_a_part_that_is_overwritten_is_a_gap_with_its_time(tmp_path):
 def test_an_empty_file_is_refused_in_one_line(ending, tmp_path, plan_at, capsys):
     path = tmp_path / f"uas_1{ending}"
     path.write_bytes(b"")
-    assert main(["import-log", str(path), "--plan", plan_at, "--out", str(tmp_path / "out")]) == 2
+    assert main(["log", str(path), "--plan", plan_at, "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err == f"error: {path}: is empty\n"
 
 
@@ -327,7 +327,7 @@ def test_what_is_estimated_is_said_kept_and_shown(tmp_path, plan_at, capsys):
     rows = [f"{t},{a},{b},{c}" for t, (a, b, c) in zip(TIMES_S, PLACES, strict=True)]
     path.write_text("\n".join(["t_s,latitude_deg,longitude_deg,height_m", *rows]))
     out = tmp_path / "out"
-    assert main(["import-log", str(path), "--plan", plan_at, "--out", str(out)]) == 0
+    assert main(["log", str(path), "--plan", plan_at, "--out", str(out)]) == 0
     err = capsys.readouterr().err
     assert "warning: uas_1: charge estimated as of level flight at full speed" in err
     assert "warning: uas_2: flight estimated as a stay at its start: it has no log" in err

@@ -20,12 +20,14 @@ from test_export import random_flight
 
 from uas_coverage_env import Flight, load_planner, rollout
 from uas_coverage_env.cli import main
+from uas_coverage_env.cli.sorties import keep_planned, planned_directory
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.flight import accomplished, covered_at, rest_of
+from uas_coverage_env.flight import covered_at, rest_of
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.operations import LocalFrame, flown_flight, read_log
-from uas_coverage_env.operations.flown_way import AT_HOME_M
-from uas_coverage_env.operations.logs import Logged
+from uas_coverage_env.operations.logs.flown_path import AT_HOME_M
+from uas_coverage_env.operations.logs.logged import Logged
 from uas_coverage_env.scenario import Place, Scenario, load_scenario
 
 HERE = ("--place", "47.5,19.05")
@@ -69,7 +71,8 @@ def test_an_exported_track_comes_back_as_the_flight_that_it_was(plan, plan_at, t
     arguments = ["--format", "csv", "--out", str(files), "--min-slack", "0", *HERE]
     assert main(["export", plan_at, *arguments]) == 0
     logs = [str(files / f"{name}.csv") for name in plan.names]
-    assert main(["import-log", *logs, "--plan", plan_at, "--out", str(out), *HERE]) == 0
+    # the export holds its flight, and where it is
+    assert main(["log", *logs, "--plan", str(files), "--out", str(out)]) == 0
     said = capsys.readouterr()
     assert "covered 100%" in said.out
     assert "estimated" not in said.out + said.err
@@ -91,6 +94,15 @@ def test_an_exported_track_comes_back_as_the_flight_that_it_was(plan, plan_at, t
     assert plan.min_separation_m - 0.1 < flight.min_separation_m < plan.min_separation_m + 0.5
     assert accomplished(flight)
     assert (out / "map.png").is_file()
+
+
+def test_the_log_of_one_of_several_sorties_needs_its_own_plan(plan, tmp_path):
+    keep_planned([plan, plan], tmp_path, None)
+    with pytest.raises(InputError, match=r"holds 2 sorties; give the one .* \S*planned_1$"):
+        planned_directory(tmp_path)
+    assert Flight.load(planned_directory(tmp_path / "planned_2")) == plan
+    keep_planned([plan], tmp_path, None)
+    assert Flight.load(planned_directory(tmp_path)) == plan
 
 
 def test_charge_of_a_log_is_that_of_the_flight(plan):
@@ -225,7 +237,7 @@ def test_data_flash_logs_become_a_flight(plan, plan_at, tmp_path, capsys):
         bin_log(path, log.time_s, places, first_s=100.0 + 50.0 * i)
         paths.append(f"{name}={path}")
     out = tmp_path / "flown"
-    assert main(["import-log", *paths, "--plan", plan_at, "--out", str(out), *HERE]) == 0
+    assert main(["log", *paths, "--plan", plan_at, "--out", str(out), *HERE]) == 0
     capsys.readouterr()
     flight = Flight.load(out)
     assert flight.covered[-1] == plan.covered[-1]
@@ -264,7 +276,7 @@ def test_recorded_flights_of_an_autopilot_come_home_and_are_judged(tmp_path, cap
         path.write_text(text)
         logs.append(str(path))
     out = tmp_path / "flown"
-    assert main(["import-log", *logs, "--plan", str(tmp_path / "plan"), "--out", str(out)]) == 0
+    assert main(["log", *logs, "--plan", str(tmp_path / "plan"), "--out", str(out)]) == 0
     capsys.readouterr()
     flight = Flight.load(out)
     for k in (0, 1):
@@ -282,7 +294,7 @@ def test_recorded_flights_of_an_autopilot_come_home_and_are_judged(tmp_path, cap
 HEAD = "t_s,latitude_deg,longitude_deg,height_m"
 MISTAKES = {
     "no file": (None, "cannot be read or written (no such file"),
-    "nothing": ("", "has no column t_s"),
+    "nothing": ("", "is empty"),
     "no column": ("t_s,lat,lon\n0,1,2", "has no column latitude_deg"),
     "no rows": (HEAD, "holds no sample"),
     "no number": (f"{HEAD}\n0,47,x,1", "line 2: longitude_deg 'x' is no number"),
@@ -305,7 +317,7 @@ def test_a_log_that_cannot_be_meant_is_refused_in_one_line(case, plan_at, tmp_pa
     if text is not None:
         path.write_text(text)
     arguments = [str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert said in err
@@ -332,7 +344,7 @@ def test_a_file_that_is_no_log_is_refused_in_one_line(case, plan_at, tmp_path, c
     path.write_text(f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n" * 20 if "csv" not in name else
                     f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n")  # fmt: skip
     arguments = [str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     assert said in capsys.readouterr().err
 
 
@@ -340,5 +352,5 @@ def test_two_logs_of_one_uas_are_refused(plan, plan_at, tmp_path, capsys):
     path = tmp_path / "uas_1.csv"
     path.write_text(f"{HEAD}\n0,47.5,19.05,0\n1,47.5,19.05,20\n")
     arguments = [str(path), str(path), "--plan", plan_at, "--out", str(tmp_path / "out"), *HERE]
-    assert main(["import-log", *arguments]) == 2
+    assert main(["log", *arguments]) == 2
     assert "is a second log of uas_1" in capsys.readouterr().err

@@ -12,7 +12,7 @@ import osmium
 from drawings import HOME, SQUARE, collection, feature, imported, refused
 
 from uas_coverage_env.operations import LocalFrame
-from uas_coverage_env.operations.tags import STANDING
+from uas_coverage_env.operations.area_import.osm_tags import STANDING
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

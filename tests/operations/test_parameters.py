@@ -15,8 +15,14 @@ from test_when_something_fails import BEYOND, HERE, SCHOOL, flown
 
 from uas_coverage_env import rollout
 from uas_coverage_env.cli import main
-from uas_coverage_env.operations import FIRMWARES, ExportOptions, LocalFrame, make_export
-from uas_coverage_env.operations.formats.parameters import COPTER_46, COPTER_47, PARAMETERS, PX4
+from uas_coverage_env.operations import ExportOptions, LocalFrame, make_export
+from uas_coverage_env.operations.mission_export.formats.firmware import (
+    COPTER_46,
+    COPTER_47,
+    FIRMWARES,
+    PX4,
+)
+from uas_coverage_env.operations.mission_export.formats.parameters import PARAMETERS
 from uas_coverage_env.vehicle.battery import open_circuit_voltage
 
 # read in the sources of ArduCopter 4.7-dev of December 2025 and 4.8-dev of April 2026, and in

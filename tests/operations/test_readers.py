@@ -25,9 +25,10 @@ from drawn_files import (
 )
 from random_drawings import AREA, HOME, mission
 
-from uas_coverage_env.flight import accomplished, load_planner, rollout
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.operations import DrawnPolygon, LocalFrame, read_drawings
-from uas_coverage_env.operations.drawing import LeftOut
+from uas_coverage_env.operations.area_import.drawn_areas import LeftOut
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

@@ -10,11 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.drawing import DrawnPolygon, LeftOut, TakeOff, drawn_of
-from uas_coverage_env.operations.features import Feature, attributes_of
-from uas_coverage_env.operations.lengths import length_m
-from uas_coverage_env.operations.roles import ROLES, UNSAID
-from uas_coverage_env.operations.tags import (
+from uas_coverage_env.operations.area_import.drawn_areas import (
+    DrawnPolygon,
+    LeftOut,
+    TakeOff,
+    drawn_of,
+)
+from uas_coverage_env.operations.area_import.feature_roles import ROLES, UNSAID
+from uas_coverage_env.operations.area_import.geo_features import GeoFeature, attributes_of
+from uas_coverage_env.operations.area_import.length_texts import length_m
+from uas_coverage_env.operations.area_import.osm_tags import (
     LEAST_M,
     MET_TALL,
     STANDING,
@@ -36,7 +41,7 @@ CLOSED = {"type": "LineString", "coordinates": RING}
 
 def made(geometry, attributes):
     """What a feature becomes: the words of the table, or `refused`."""
-    thing = Feature("f", "one", geometry, attributes_of(attributes))
+    thing = GeoFeature("f", "one", geometry, attributes_of(attributes))
     try:
         (one,) = drawn_of(thing)
     except InputError as error:
@@ -193,5 +198,5 @@ def test_a_height_that_cannot_be_read_is_counted():
 
 def test_a_take_off_place_may_be_drawn_as_several_points():
     many = {"type": "MultiPoint", "coordinates": RING[:2]}
-    places = list(drawn_of(Feature("f", "one", many, {"role": "home"})))
+    places = list(drawn_of(GeoFeature("f", "one", many, {"role": "home"})))
     assert [type(place) for place in places] == [TakeOff, TakeOff]

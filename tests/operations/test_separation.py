@@ -13,9 +13,9 @@ from test_lateness import FIELD, HOMES, KEPT_M, PLACES, least_m, pair_of
 pytest.importorskip("pyproj")
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.mission.leg_model import DT_S, Autopilot, follow
-from uas_coverage_env.mission.separation import Waits, separate
 from uas_coverage_env.operations import ExportOptions, make_export
+from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, follow
+from uas_coverage_env.planning.execution.separation import Waits, separate
 from uas_coverage_env.scenario import Place
 
 SLACK_S = 20.0
@@ -175,6 +175,8 @@ def test_files_that_need_no_waits_hold_none(flight):
 
 
 def test_an_export_that_no_wait_helps_is_refused_with_pair_and_place(flight, monkeypatch):
-    monkeypatch.setattr("uas_coverage_env.operations.apart.separate", lambda *_, **__: None)
+    monkeypatch.setattr(
+        "uas_coverage_env.operations.mission_export.scheduling.separate", lambda *_, **__: None
+    )
     with pytest.raises(InputError, match=r"uas_1 and uas_2 come closer .* no wait after take-off"):
         export_of(flight, min_slack_s=SLACK_S)

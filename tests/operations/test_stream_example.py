@@ -13,8 +13,9 @@ from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import LocalFrame
-from uas_coverage_env.operations.room import Surroundings
-from uas_coverage_env.operations.stream import StreamOptions, stream_flight, timeline_of
+from uas_coverage_env.operations.clearance import Surroundings
+from uas_coverage_env.operations.stream import StreamOptions, stream_flight
+from uas_coverage_env.operations.stream.timeline import timeline_of
 from uas_coverage_env.scenario import load_scenario
 
 

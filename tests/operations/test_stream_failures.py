@@ -20,7 +20,7 @@ pytest.importorskip("pyproj")
 
 from stream_support import Loopback, apart_m, is_home, off_m, plan_of_two
 
-from uas_coverage_env.operations.stream.around import Around
+from uas_coverage_env.operations.stream.surroundings import SwarmSurroundings
 
 
 @pytest.fixture(scope="module")
@@ -164,7 +164,7 @@ def test_a_vehicle_is_not_sent_back_through_a_wall(flight):
 
 
 def test_a_way_back_is_clear_only_of_other_uas_too(flight):
-    around = Around(flight.scenario, ["uas_1", "uas_2"])
+    around = SwarmSurroundings(flight.scenario, ["uas_1", "uas_2"])
     here, there = np.array([100.0, 60.0, -20.0]), np.array([100.0, 100.0, -20.0])
     for between_m, is_clear in ((80.0, False), (110.0, True)):
         others_m = {"uas_2": np.array([100.0, between_m, -20.0])}
@@ -172,7 +172,7 @@ def test_a_way_back_is_clear_only_of_other_uas_too(flight):
 
 
 def test_landing_and_flying_straight_home_are_told_only_where_the_way_is_clear(flight):
-    around = Around(flight.scenario, ["uas_1", "uas_2"])
+    around = SwarmSurroundings(flight.scenario, ["uas_1", "uas_2"])
     over, beyond = np.array([120.0, 152.0, -45.0]), np.array([120.0, 170.0, -20.0])
     home = np.array([60.0, 60.0, -3.0])
     assert not around.may_land("uas_1", over, {})

@@ -10,10 +10,10 @@ from small_worlds import box, meadow
 
 pytest.importorskip("pyproj")
 
-from uas_coverage_env.operations.stream.around import Around, stopping_place_m
-from uas_coverage_env.operations.stream.limits import Limits
-from uas_coverage_env.operations.stream.pace import SHARE, STEP_S, Pace
+from uas_coverage_env.operations.stream.surroundings import SwarmSurroundings, stopping_place_m
+from uas_coverage_env.operations.stream.time_scaling import SHARE, STEP_S, Pace
 from uas_coverage_env.operations.stream.timeline import Timeline
+from uas_coverage_env.operations.stream.vehicle_limits import Limits
 
 WALL = box("wall", (0.0, 100.0, -45.0), (199.0, 104.0, 0.0))
 LIMITS = Limits()
@@ -33,7 +33,7 @@ def plan_of(speeds, turns):
 def pace_of(plan, limits=LIMITS, *, may_hurry=True):
     middle_m = np.array([100.0, 150.0, -20.0]) - plan.places_m[0]
     moved = Timeline(plan.times_s, plan.places_m + middle_m, plan.velocities_mps)
-    around = Around(meadow(), ["uas_1"])
+    around = SwarmSurroundings(meadow(), ["uas_1"])
     return Pace({"uas_1": moved}, {"uas_1": limits}, around, 1.5, may_hurry)
 
 
@@ -87,7 +87,7 @@ def test_a_vehicle_whose_link_is_cut_anywhere_stops_clear_of_a_wall(speed, angle
     places = np.array([100.0, east, -20.0]) + way[:, None] * along
     places[:, 0] = np.clip(places[:, 0], 20.0, 180.0)
     plan = Timeline(np.arange(len(way), dtype=float), places, velocities[:, None] * along)
-    around = Around(meadow(((100.0, 60.0, -1.0),), obstacles=[WALL]), ["uas_1"])
+    around = SwarmSurroundings(meadow(((100.0, 60.0, -1.0),), obstacles=[WALL]), ["uas_1"])
     pace = Pace({"uas_1": plan}, {"uas_1": LIMITS}, around, 1.5, may_hurry=True)
     for plan_s in np.arange(plan.first_s, plan.last_s, 0.2):
         place_m = plan.place_m(plan_s)
@@ -114,7 +114,7 @@ def test_all_slow_down_where_one_that_stops_would_be_in_the_way_of_another():
         for name, ahead in (("uas_1", 15.0), ("uas_2", 0.0))
     }
     starts = (60.0, 60.0, -1.0), (30.0, 60.0, -1.0)
-    around = Around(meadow(starts), ["uas_1", "uas_2"])
+    around = SwarmSurroundings(meadow(starts), ["uas_1", "uas_2"])
     both = Pace(plans, dict.fromkeys(plans, LIMITS), around, 1.5, may_hurry=False)
     alone = Pace({"uas_1": plans["uas_1"]}, {"uas_1": LIMITS}, around, 1.5, may_hurry=False)
     assert both.slowed["others"] > 0

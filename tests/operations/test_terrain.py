@@ -20,8 +20,8 @@ from shapely.geometry import Point
 
 from uas_coverage_env.flight import load_planner, rollout, seen_ground
 from uas_coverage_env.operations import ExportOptions, LocalFrame, make_export
-from uas_coverage_env.operations.ground import Ground
-from uas_coverage_env.operations.hills import LOW_M, MOST_BOXES, hills
+from uas_coverage_env.operations.area_import.ground import Ground
+from uas_coverage_env.operations.area_import.terrain_obstacles import LOW_M, MOST_BOXES, hills
 from uas_coverage_env.world.coverage import covering_samples
 
 CELL_DEG, WEST, NORTH, SIZE = 0.0001, 9.998, 50.004, 70

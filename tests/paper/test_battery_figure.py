@@ -10,16 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from uas_coverage_env.vehicle import (
-    DELTA_THRUST,
-    DOD,
-    N_INPUTS,
-    N_STATES,
-    U_TH,
-    linear_model,
-    load_vehicle,
-    simulate_battery,
-)
+from uas_coverage_env.vehicle import linear_model, load_vehicle, simulate_battery
+from uas_coverage_env.vehicle.layout import DELTA_THRUST, DOD, N_INPUTS, N_STATES, U_TH
 
 S500 = load_vehicle("s500_v2")
 SOC, VOLTAGE, CURRENT = range(3)

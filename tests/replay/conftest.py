@@ -10,7 +10,7 @@ from chromium import started
 from uas_coverage_env.flight import MODES, Flight, Violation, load_planner, rollout
 from uas_coverage_env.flight.record import PLAN_DTYPE
 from uas_coverage_env.scenario import generate_scenario, load_scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 HORIZON = 18
 

@@ -10,25 +10,24 @@ from drawn_lines import lines
 from matplotlib.patches import Rectangle
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, DecisionRecord
+from uas_coverage_env.flight import MODES
+from uas_coverage_env.flight.record import DecisionRecord
+from uas_coverage_env.replay.figure_kinds import KINDS, figure_of
 from uas_coverage_env.replay.figures import (
-    KINDS,
-    WIDTH_IN,
     battery_figure,
     decision_time_figure,
-    learning_curve,
-    look,
     modes_figure,
     save_figure,
     training_figure,
-    with_baselines,
 )
 from uas_coverage_env.replay.figures.battery import published_battery
+from uas_coverage_env.replay.figures.style import WIDTH_IN, look
+from uas_coverage_env.replay.figures.training import learning_curve, with_baselines
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_is_a_vector_file_that_repeats_to_the_byte(kind, flight, tmp_path):
-    figures = [KINDS[kind](flight) for _ in range(2)]
+    figures = [figure_of(kind)(flight) for _ in range(2)]
     for suffix, start in ((".pdf", b"%PDF"), (".svg", b"<?xml")):
         files = [tmp_path / f"{n}{suffix}" for n in (1, 2)]
         for figure, file in zip(figures, files, strict=True):
@@ -47,14 +46,14 @@ def test_figures_leave_the_settings_of_matplotlib_alone(flight, tmp_path):
 @pytest.mark.parametrize("kind", KINDS)
 def test_figures_are_as_wide_as_asked_and_narrow_ones_hold_their_legends(kind, flight):
     with look(width_in=88 / 25.4):
-        figure = KINDS[kind](flight)
+        figure = figure_of(kind)(flight)
     assert figure.get_size_inches()[0] == pytest.approx(88 / 25.4)
     figure.canvas.draw()
     for legend in figure.legends:
         box = legend.get_window_extent()
         assert box.x0 >= 0
         assert box.x1 <= figure.bbox.x1
-    assert KINDS[kind](flight).get_size_inches()[0] == pytest.approx(WIDTH_IN)
+    assert figure_of(kind)(flight).get_size_inches()[0] == pytest.approx(WIDTH_IN)
 
 
 def test_a_style_wins_over_ours_and_only_where_it_is_asked_for(flight, tmp_path):

@@ -25,7 +25,8 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env.cli import main
 from uas_coverage_env.flight import load_planner, rollout
-from uas_coverage_env.replay import LivePage, write_replay
+from uas_coverage_env.replay import write_replay
+from uas_coverage_env.replay.live import LivePage
 from uas_coverage_env.scenario import load_scenario
 
 

@@ -8,7 +8,8 @@ from drawn_lines import lines
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES
-from uas_coverage_env.replay.figures import look, map_figure
+from uas_coverage_env.replay.figures import map_figure
+from uas_coverage_env.replay.figures.style import look
 from uas_coverage_env.scenario import Sensor
 
 

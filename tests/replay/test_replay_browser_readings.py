@@ -27,12 +27,13 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
-from uas_coverage_env.flight import DecisionRecord, load_planner, rollout
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.record import DecisionRecord
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.replay import write_replay
 from uas_coverage_env.replay.reach_data import reach
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 pytestmark = needs_chromium
 

@@ -27,11 +27,12 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.flight import SceneHistory, load_planner, rollout
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.replay import write_replay
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 pytestmark = needs_chromium
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import SceneHistory, load_planner, rollout
+from uas_coverage_env.flight import load_planner, rollout
 from uas_coverage_env.flight.record import PLAN_DTYPE
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.replay import replay_page, write_replay
 from uas_coverage_env.replay.flight_data import flight_data
 from uas_coverage_env.replay.scene_data import scene_data

@@ -6,7 +6,7 @@ import pytest
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.replay.reach_data import GRID, reach
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.vehicle import DOD, N_STATES
+from uas_coverage_env.vehicle.layout import DOD, N_STATES
 
 
 @pytest.fixture(scope="module")

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow
 
-from uas_coverage_env.flight import DecisionRecord, SceneHistory, load_planner, rollout
-from uas_coverage_env.flight.record import EventRecord
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.figure import NOTHING
+from uas_coverage_env.flight.figures import printed
+from uas_coverage_env.flight.record import DecisionRecord, EventRecord
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.replay.flight_data import flight_data
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.replay.safety_data import FAR_M, floors_m, rooms
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 
 def marks(flight, kind):
@@ -33,6 +36,13 @@ def test_the_page_says_what_range_says(plain):
         for i in range(uas):
             spare = range_.spare_dod(i, plain.x[k, i])
             assert soc[k, i] - needed[k, i] == pytest.approx(spare, abs=1.1e-4)
+
+
+def test_the_page_has_the_figures_that_show_prints(plain):
+    data = flight_data(plain, "here")
+    told = {name: text for name, text in printed(plain).items() if text != NOTHING}
+    assert dict(data["figures"]) == told
+    assert told["steps"] == str(data["summary"]["steps"])
 
 
 def test_the_point_of_no_return_is_where_nothing_is_left_beyond_the_way_home(discharged):

@@ -37,6 +37,7 @@ def test_the_types_of_the_viewer_fit():
 
 def test_the_viewer_passes_its_unit_tests_and_reads_what_python_wrote(flight, tmp_path):
     uas = range(len(flight.names))
+    power_W = flight.voltage_V * flight.current_A
     moments = [
         {
             "time_s": k * flight.scenario.dt_s,
@@ -44,6 +45,7 @@ def test_the_viewer_passes_its_unit_tests_and_reads_what_python_wrote(flight, tm
             "soc": flight.soc[k].tolist(),
             "mode": [MODES[flight.mode[k, i]] for i in uas],
             "covered": int(flight.covered[k]),
+            "energy_Wh": float(power_W[:k].sum()) * flight.scenario.dt_s / 3600.0,
         }
         for k in np.linspace(0, flight.steps, 7).astype(int)
     ]

@@ -6,6 +6,17 @@ import re
 from importlib.resources import files
 from pathlib import Path
 
+from uas_coverage_env.draw.colours import (
+    BLUE,
+    INK,
+    PAGES,
+    WHITE,
+    hex_of,
+    on_dark_area,
+    on_dark_line,
+    page_style,
+)
+
 VIEWER = Path(__file__).parents[2] / "viewer"
 BUNDLE = files("uas_coverage_env.replay").joinpath("viewer.js").read_text(encoding="utf-8")
 
@@ -18,6 +29,29 @@ def test_the_bundle_was_built_from_the_sources_as_they_are():
     for name in ("package.json", "build.mjs", *(f"src/{source}" for source in sources)):
         total.update(f"{name}\n".encode() + (VIEWER / name).read_bytes() + b"\n")
     assert re.findall(r"sources sha256:(\w+)", BUNDLE) == [total.hexdigest()]
+
+
+def test_every_colour_that_the_viewer_names_is_in_the_one_table():
+    sources = "".join(path.read_text() for path in sorted((VIEWER / "src").iterdir()))
+    named = set(re.findall(r"""(?:var\(|colour\(\s*|["'])--([a-z-]+)""", sources))
+    set_by_the_page = {"uas", "kind", "done"}
+    assert set_by_the_page < named
+    assert not named - set_by_the_page - set(PAGES)
+    assert not re.search(r"--[a-z-]+:\s*#", sources)
+
+
+def test_pages_are_given_all_colours_light_and_dark():
+    light, dark = page_style().split("@media", 1)
+    for name, both in PAGES.items():
+        for style, colour in zip((light, dark), both, strict=True):
+            assert f"--{name}:{hex_of(colour)};" in style
+
+
+def test_on_dark_pages_lines_are_lighter_and_areas_darker_as_in_the_viewer():
+    """As `bright` and `dim` of viewer/src/palette.ts."""
+    assert hex_of(on_dark_line(BLUE)) == "#4d9cc9"
+    assert hex_of(on_dark_line(INK)) == "#b3b4b5"
+    assert hex_of(on_dark_area(WHITE)) == "#b3b3b3"
 
 
 def test_the_bundle_carries_the_licence_of_three():

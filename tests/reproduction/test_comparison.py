@@ -17,9 +17,10 @@ from uas_coverage_baselines.reproduction.settings import FLOWN
 
 from uas_coverage_env import simulate_battery
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import energy_Wh, summary
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.replay.figures import published_battery
-from uas_coverage_env.scenario import flood_village
+from uas_coverage_env.scenario.families.flood_village import flood_village
 from uas_coverage_env.vehicle import load_vehicle
 
 PAPER = paper_named("gasche2025")

@@ -12,7 +12,7 @@ from uas_coverage_baselines.reproduction.decisions import decision, seen_at, who
 from uas_coverage_baselines.reproduction.sizes import LEFT_OUT, class_sizes, sizes_by_class, timed
 from uas_coverage_baselines.reproduction.sweeps import ORDERS, discretisation_error_m, trades
 
-from uas_coverage_env.world import FLYING, LANDED
+from uas_coverage_env.entities.state import FLYING, LANDED
 
 
 @pytest.fixture(scope="module")

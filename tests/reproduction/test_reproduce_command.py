@@ -12,7 +12,7 @@ from uas_coverage_baselines.reproduction.published import paper_named
 
 from uas_coverage_env import Flight
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import flood_village
+from uas_coverage_env.scenario.families.flood_village import flood_village
 
 SOON = {"horizon": 8, "teams": 1, "deterministic": True, "threads": 1, "return_rule": "vehicle"}
 

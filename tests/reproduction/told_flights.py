@@ -7,7 +7,7 @@ import numpy as np
 
 from uas_coverage_env.flight import MODES, Flight, rollout
 from uas_coverage_env.scenario import load_scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 COVERING, RETURN, LANDED = (MODES.index(name) for name in ("covering", "return", "landed"))
 SCENARIO = load_scenario("gasche2025")

@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from uas_coverage_baselines.routing import (
-    OrderSearch,
     Routes,
-    RouteWindow,
     RoutingTask,
     SearchEffort,
     annealing,
@@ -19,6 +17,8 @@ from uas_coverage_baselines.routing import (
     improve_routes,
 )
 from uas_coverage_baselines.routing import search as search_module
+from uas_coverage_baselines.routing.search import OrderSearch
+from uas_coverage_baselines.routing.window import RouteWindow
 
 SOME = SearchEffort(20_000)
 seeds = st.integers(0, 10_000)

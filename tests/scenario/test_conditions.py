@@ -5,22 +5,17 @@ import itertools
 import pytest
 
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import (
-    LEVELS,
-    Uncertainty,
-    Wind,
-    conditions_of,
-    load_scenario,
-    out_of_reach,
-    with_disturbances,
-)
+from uas_coverage_env.scenario import Uncertainty, Wind, load_scenario, with_disturbances
+from uas_coverage_env.scenario.checks import out_of_reach
+from uas_coverage_env.scenario.conditions import conditions_of
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 
 
 def wind(mean_mps, **more):
     return Wind(mean_mps=mean_mps, from_deg=0.0, **more)
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("level", DISTURBANCE_LEVELS)
 def test_all_winds_of_a_level_are_stated_alike_and_so_planners_know_none_of_them(level):
     field = load_scenario("open_field")
     drawn = [with_disturbances(field, level, seed) for seed in range(20)]
@@ -28,15 +23,15 @@ def test_all_winds_of_a_level_are_stated_alike_and_so_planners_know_none_of_them
     stated = drawn[0].conditions
     assert stated is not None
     assert all(scenario.conditions == stated for scenario in drawn)
-    assert stated.mean_mps == LEVELS[level].mean_mps[1]
-    assert stated.uncertainty == LEVELS[level].uncertainty
+    assert stated.mean_mps == DISTURBANCE_LEVELS[level].mean_mps[1]
+    assert stated.uncertainty == DISTURBANCE_LEVELS[level].uncertainty
     told = [MissionBrief.of(scenario).model_dump(exclude={"name"}) for scenario in drawn]
     assert all(each == told[0] for each in told)
 
 
 def test_a_stronger_level_states_more():
     field = load_scenario("open_field")
-    stated = [with_disturbances(field, level, 0).conditions for level in LEVELS]
+    stated = [with_disturbances(field, level, 0).conditions for level in DISTURBANCE_LEVELS]
     for weak, strong in itertools.pairwise(stated):
         assert weak.mean_mps < strong.mean_mps
         assert weak.unknown_mps < strong.unknown_mps

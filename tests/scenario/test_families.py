@@ -9,17 +9,11 @@ import pytest
 from uas_coverage_env import evaluate
 from uas_coverage_env.env import CoverageParallelEnv
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.scenario import (
-    Family,
-    MissionSource,
-    Size,
-    installed_families,
-    load_scenario,
-    warnings,
-)
+from uas_coverage_env.scenario import Family, MissionSource, load_scenario, warnings
 from uas_coverage_env.scenario import families as package
+from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.scenario.families.open_field import open_field
-from uas_coverage_env.scenario.families.site import CLEARANCE_M, GAP_M
+from uas_coverage_env.scenario.families.site import CLEARANCE_M, GAP_M, Size
 
 SIZED = [name for name, family in package.BUILT_IN.items() if isinstance(family, Family)]
 SUFFICIENT = [name for name in SIZED if name != "low-charge"]

@@ -7,7 +7,8 @@ import pytest
 
 from uas_coverage_env.leaderboard import scenarios_of
 from uas_coverage_env.mission import MissionBrief, WorldView
-from uas_coverage_env.scenario import flood_village, load_scenario, warnings
+from uas_coverage_env.scenario import load_scenario, warnings
+from uas_coverage_env.scenario.families.flood_village import flood_village
 
 TEN = range(10)
 DRAWN = {seed: flood_village(seed) for seed in TEN}

@@ -6,7 +6,8 @@ from small_worlds import meadow, waypoint
 from uas_coverage_env import load_scenario
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.strict_toml import parse
-from uas_coverage_env.mission import MissionBrief, refuse_what_asks
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.scenario import Scenario, warnings
 
 

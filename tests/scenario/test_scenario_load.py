@@ -7,7 +7,8 @@ import pytest
 from uas_coverage_env import rollout
 from uas_coverage_env import scenario as room
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.scenario import installed_families, load_scenario, scenario_names, warnings
+from uas_coverage_env.scenario import load_scenario, scenario_names, warnings
+from uas_coverage_env.scenario.families import installed_families
 
 TEXT = (Path(room.__file__).parent / "open_field.toml").read_text(encoding="utf-8")
 WAYPOINTS = TEXT[TEXT.index("[[waypoints]]") : TEXT.index("# Drawn only")]

@@ -9,7 +9,8 @@ from small_worlds import box, meadow, waypoint
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.scenario import Sensing, Wind
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import COURSE_SPEED_MPS, N_STATES, PSI, TAU_Z, VX, VY, WZ, X, Z
+from uas_coverage_env.vehicle.inner_loop import COURSE_SPEED_MPS
+from uas_coverage_env.vehicle.layout import N_STATES, PSI, TAU_Z, VX, VY, WZ, X, Z
 from uas_coverage_env.world import Acceleration, GoTo, Velocity, Wrench
 
 MODELS = ("lpv", "nonlinear")

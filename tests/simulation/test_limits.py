@@ -7,10 +7,19 @@ import numpy as np
 import pytest
 from small_worlds import meadow
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, LIMIT_NAMES, LIMITS, U_TH, limit_names, load_vehicle
-from uas_coverage_env.vehicle.limits import DISTURBED_TOLERANCE, LPV_TOLERANCE, NONLINEAR_TOLERANCE
-from uas_coverage_env.world import FLYING, Acceleration, Velocity, Wrench
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import DOD, U_TH
+from uas_coverage_env.vehicle.limits import (
+    DISTURBED_TOLERANCE,
+    LIMIT_NAMES,
+    LIMITS,
+    LPV_TOLERANCE,
+    NONLINEAR_TOLERANCE,
+    limit_names,
+)
+from uas_coverage_env.world import Acceleration, Velocity, Wrench
 
 S500 = load_vehicle("s500_v2")
 

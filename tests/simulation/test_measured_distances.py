@@ -5,8 +5,10 @@ import pytest
 from small_worlds import box, meadow, mover, waypoint
 
 from uas_coverage_env import generate_scenario, load_scenario
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import COMMAND_DTYPE, CONTACT_NAMES, KIND_NAMES, build_arena
+from uas_coverage_env.world import build_arena
 
 DISTANCES = ("obstacle_clearance_m", "separation_m")
 VELOCITY = KIND_NAMES.index("velocity")

@@ -5,8 +5,11 @@ import pytest
 
 from uas_coverage_env import generate_scenario
 from uas_coverage_env.autopilot.assist import assistants
-from uas_coverage_env.simulation import advance, initial_state
-from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, VELOCITY, build_arena
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.simulation.step import advance
+from uas_coverage_env.simulation.world import initial_state
+from uas_coverage_env.world import build_arena
 
 # written, and read, only where disturbances act: `flight.clear` resets them
 OF_DISTURBANCES = {"wind_mps", "force_N", "dod_lost"}

@@ -7,10 +7,12 @@ from hypothesis import strategies as st
 from oracle import expected_step
 from small_worlds import box, meadow, mover, waypoint
 
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.entities.state import FLYING, LANDED, LOST
 from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import LIMIT_NAMES, limit_names
-from uas_coverage_env.world import COMMAND_DTYPE, CONTACT_NAMES, FLYING, KIND_NAMES, LANDED, LOST
+from uas_coverage_env.vehicle.limits import LIMIT_NAMES, limit_names
 
 VELOCITY, ACCELERATION, WRENCH = map(KIND_NAMES.index, ("velocity", "acceleration", "wrench"))
 

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from small_worlds import meadow, mover
 
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, GoTo, SwarmState, Velocity, Wrench
+from uas_coverage_env.world import GoTo, SwarmState, Velocity, Wrench
 
 SHORT_FLIGHT = """
 import sys

@@ -33,10 +33,8 @@ def test_random_policy_and_best_planner_score_0_and_1_on_the_missions_of_the_anc
 
 
 def mission(seed: int, value: float) -> MissionScore:
-    return MissionScore(
-        seed=seed, value=value, episode_return=1.0, coverage=1.0, energy_share=0.2, lost=0, home=1,
-        n_uas=1, steps=9,
-    )  # fmt: skip
+    figures = {"coverage": 1.0, "energy_share": 0.2, "lost": 0, "home": 1, "n_uas": 1, "steps": 9}
+    return MissionScore(seed, value, {"episode_return": 1.0, **figures})
 
 
 def test_the_missions_of_a_folder_are_those_of_the_test_split_by_seed(tmp_path):

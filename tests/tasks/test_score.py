@@ -9,16 +9,11 @@ from leaderboard_rows import flights_in, row
 from uas_coverage_env.cli import main
 from uas_coverage_env.cli import score as command
 from uas_coverage_env.files.errors import PlannerError
+from uas_coverage_env.flight.metrics import available_Wh
 from uas_coverage_env.leaderboard import flying
 from uas_coverage_env.tasks import LEVELS, level_named, score, seeds_of
 from uas_coverage_env.tasks import scoring as module
-from uas_coverage_env.tasks.scoring import (
-    MissionScore,
-    anchors_of,
-    available_Wh,
-    mission_value,
-    scored,
-)
+from uas_coverage_env.tasks.scoring import MissionScore, anchors_of, scored
 from uas_coverage_env.tasks.table import cells, markdown
 
 
@@ -27,16 +22,18 @@ def mission(seed, value, **changes):
         "episode_return": 1.0, "coverage": 1.0, "energy_share": 0.2, "lost": 0, "home": 1,
         "n_uas": 1, "steps": 9,
     }  # fmt: skip
-    return MissionScore(seed=seed, value=value, **(usual | changes))
+    return MissionScore(seed, value, usual | changes)
 
 
 def test_the_value_of_a_mission_is_its_formula():
-    scenario = level_named("easy").scenario(seeds_of("test")[0])
-    found = MissionScore.of(row(coverage=0.5, energy_Wh=0.4 * available_Wh(scenario)), scenario)
-    assert found.energy_share == pytest.approx(0.4)
-    assert found.value == pytest.approx(0.5 * (1.0 - 0.2))
-    assert mission_value(1.0, 0.0, 0.4) == mission_value(0.0, 1.0, 0.4) == 0.0
-    assert mission_value(1.0, 0.5, 7.0) == 0.25, "energy counts for half at most"
+    def value(**figures):
+        return MissionScore.of(row(energy_share=0.4, **figures)).value
+
+    assert value(coverage=0.5) == pytest.approx(0.5 * (1.0 - 0.2))
+    assert value(coverage=0.0) == value(home=0) == 0.0
+    assert MissionScore.of(row(n_uas=2, home=1, energy_share=7.0)).value == 0.25, (
+        "energy counts for half at most"
+    )
 
 
 def test_what_batteries_may_give_is_what_they_give_in_flight():
@@ -182,6 +179,7 @@ def test_the_folder_of_another_command_and_scores_of_0_3_0_are_refused(tmp_path,
     assert (
         main(
             [
+                "planner",
                 "demonstrate",
                 "open_field",
                 "--planner",

@@ -13,9 +13,9 @@ from uas_coverage_baselines.trajectory.retiming import (
 from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
 from uas_coverage_baselines.trajectory.work import done
 
-from uas_coverage_env.geometry import segment_clearance
+from uas_coverage_env.geometry.segments import segment_clearance
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 
 @pytest.fixture(scope="module")

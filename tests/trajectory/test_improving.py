@@ -12,9 +12,9 @@ from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 from uas_coverage_baselines.trajectory.improving import Improvement
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 QUICK = {"orders": 1, "moves": 20_000, "programs": 40}
 

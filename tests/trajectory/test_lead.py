@@ -17,19 +17,12 @@ from uas_coverage_env import rollout
 from uas_coverage_env.autopilot.belief import wind_growth
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import fly_kinematically
-from uas_coverage_env.entities.commands import VELOCITY, WRENCH
-from uas_coverage_env.flight import accomplished, energy_Wh
-from uas_coverage_env.mission import (
-    MEAN_HEIGHT_M,
-    LearntWind,
-    MissionBrief,
-    WorldView,
-    first_sight,
-    in_disturbances,
-)
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY, WRENCH
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh
+from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind, in_disturbances
 from uas_coverage_env.scenario import Wind
-from uas_coverage_env.vehicle import N_INPUTS, VX, VY, VZ
-from uas_coverage_env.world import COMMAND_DTYPE
+from uas_coverage_env.vehicle.layout import N_INPUTS, VX, VY, VZ
 
 WIND_MPS = np.array([3.0, -4.0])
 

@@ -7,9 +7,10 @@ from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_baselines.trajectory.steering import FAILURES, Failures
 
 from uas_coverage_env import rollout
-from uas_coverage_env.flight import MODES, accomplished, coverage, energy_Wh, home
+from uas_coverage_env.flight import MODES
+from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.scenario import Wind
-from uas_coverage_env.scenario.levels import LEVELS
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 from uas_coverage_env.tasks import level_named, seeds_of
 
 STARTS_M = ((20.0, 20.0, -1.0), (180.0, 20.0, -1.0))
@@ -28,7 +29,7 @@ def planner():
 
 @pytest.mark.parametrize("mean_mps", [2.0, 6.5])
 def test_a_mission_in_wind_is_accomplished_without_violation(mean_mps):
-    scenario = windy(mean_mps, uncertainty=LEVELS["moderate"].uncertainty)
+    scenario = windy(mean_mps, uncertainty=DISTURBANCE_LEVELS["moderate"].uncertainty)
     flight = rollout(scenario, planner(), seed=3)
     assert accomplished(flight)
     assert flight.steps < 110
@@ -42,7 +43,7 @@ def test_the_waypoints_of_a_uas_that_is_lost_in_wind_are_covered_by_the_other():
 
 def test_a_uas_flies_home_in_time_where_no_return_mode_calls_it():
     uas = tuple(one.model_copy(update={"soc_0": 0.3}) for one in windy(2.0).uas)
-    scenario = windy(2.0, uas=uas, uncertainty=LEVELS["moderate"].uncertainty)
+    scenario = windy(2.0, uas=uas, uncertainty=DISTURBANCE_LEVELS["moderate"].uncertainty)
     flight = rollout(scenario, planner(), seed=3, return_mode=False, safety_filter=False)
     assert not flight.violations
     assert home(flight).all()

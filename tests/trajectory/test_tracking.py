@@ -10,7 +10,7 @@ from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.steering import Failures
 from uas_coverage_baselines.trajectory.tracking import tracked
 
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 SETTLED = 8  # steps after which nothing is left of a start beyond the limits
 

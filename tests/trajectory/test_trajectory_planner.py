@@ -9,12 +9,11 @@ from uas_coverage_baselines.trajectory.mission_plan import plan_mission
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 
 from uas_coverage_env import Scenario, rollout
-from uas_coverage_env.flight import accomplished, energy_Wh, fallback_reasons
-from uas_coverage_env.flight.metrics import home
+from uas_coverage_env.flight.metrics import accomplished, energy_Wh, fallback_reasons, home
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX
+from uas_coverage_env.vehicle.layout import DOD, VX
 
 QUICK = {"orders": 1, "moves": 20_000, "programs": 40, "idle_work": 0}
 TWO = ((100.0, 100.0, -1.0), (112.0, 100.0, -1.0))

@@ -6,7 +6,7 @@ from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 from uas_coverage_baselines.trajectory.under_way import still_clear
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
-from uas_coverage_env.flight import accomplished
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import GoTo
 

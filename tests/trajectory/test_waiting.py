@@ -9,10 +9,9 @@ from uas_coverage_baselines.trajectory.fleet import Moment
 from uas_coverage_baselines.trajectory.waiting import choose_waiting
 
 from uas_coverage_env import Scenario, rollout
-from uas_coverage_env.flight import accomplished
-from uas_coverage_env.flight.metrics import home
+from uas_coverage_env.flight.metrics import accomplished, home
 from uas_coverage_env.mission import Range
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 STARTS = ((20.0, 20.0, -1.0), (180.0, 180.0, -1.0))
 PLACES = (

@@ -5,21 +5,14 @@ import sys
 
 import numpy as np
 
-from uas_coverage_env.vehicle import (
-    DOD,
-    LIFT,
-    N_INPUTS,
-    N_STATES,
+from uas_coverage_env.vehicle import compile_vehicle, load_vehicle, lpv_step, plant_step
+from uas_coverage_env.vehicle.inner_loop import (
     acceleration_wrench,
-    clip_wrench,
-    compile_vehicle,
-    fly_kinematics,
-    load_vehicle,
-    lpv_step,
-    plant_step,
     velocity_climb_wrench,
     velocity_wrench,
 )
+from uas_coverage_env.vehicle.layout import DOD, LIFT, N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.lpv import clip_wrench, fly_kinematics
 
 
 def numbers() -> list[list[float]]:

@@ -5,7 +5,9 @@ from functools import cache
 import numpy as np
 from hypothesis import strategies as st
 
-from uas_coverage_env.vehicle import (
+from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
+from uas_coverage_env.vehicle.inner_loop import velocity_wrench
+from uas_coverage_env.vehicle.layout import (
     DOD,
     LIFT,
     N_INPUTS,
@@ -24,9 +26,6 @@ from uas_coverage_env.vehicle import (
     WZ,
     X,
     Z,
-    compile_vehicle,
-    load_vehicle,
-    velocity_wrench,
 )
 
 NAMES = ("s500_v2", "hexacopter")

@@ -7,13 +7,15 @@ from small_worlds import meadow
 from uas_coverage_env import World, linear_model, load_vehicle, simulate_battery
 from uas_coverage_env.bound.prices import Ends, energy_prices
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.features import uncertainty
+from uas_coverage_env.features.parameter_errors import uncertainty
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario, Uncertainty
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.toml_text import toml_text
-from uas_coverage_env.vehicle import DOD, N_STATES, U_TH, RcPair, endurance
+from uas_coverage_env.vehicle import endurance
 from uas_coverage_env.vehicle.battery import BatteryState, further_settled_V
+from uas_coverage_env.vehicle.layout import DOD, N_STATES, U_TH
+from uas_coverage_env.vehicle.parts import RcPair
 from uas_coverage_env.world import Velocity
 
 BOTH = pytest.mark.parametrize("dynamics", ["lpv", "nonlinear"])

@@ -10,18 +10,15 @@ from hypothesis import strategies as st
 
 from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.vehicle import (
-    DOD,
-    N_INPUTS,
-    N_STATES,
     DataSheet,
     VehicleParams,
-    Z,
     compile_vehicle,
     endurance,
     lpv_step,
     make_vehicle,
     plant_step,
 )
+from uas_coverage_env.vehicle.layout import DOD, N_INPUTS, N_STATES, Z
 from uas_coverage_env.vehicle.sizing import HOVER_TOLERANCE
 
 S500 = {

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from uas_coverage_env.vehicle import (
+from uas_coverage_env.vehicle import linear_model, load_vehicle, simulate_battery
+from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
     LIFT,
@@ -26,9 +27,6 @@ from uas_coverage_env.vehicle import (
     WX,
     X,
     Z,
-    linear_model,
-    load_vehicle,
-    simulate_battery,
 )
 
 S500 = load_vehicle("s500_v2")

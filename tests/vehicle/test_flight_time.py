@@ -2,7 +2,8 @@
 
 import pytest
 
-from uas_coverage_env.vehicle import flight_time_s, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.flight_time import flight_time_s
 from uas_coverage_env.vehicle.range import (
     SpeedLimits,
     TravelTimeModel,

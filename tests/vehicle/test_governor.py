@@ -7,7 +7,13 @@ import pytest
 from flying import NAMES, STEPS_S, load, record_of
 from numba import njit
 
-from uas_coverage_env.vehicle import (
+from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.inner_loop import (
+    reseed_reference,
+    velocity_climb_wrench,
+    velocity_wrench,
+)
+from uas_coverage_env.vehicle.layout import (
     N_INPUTS,
     N_STATES,
     PHI,
@@ -22,13 +28,8 @@ from uas_coverage_env.vehicle import (
     WY,
     WZ,
     Z,
-    clip_wrench,
-    fly_kinematics,
-    reseed_reference,
-    velocity_climb_wrench,
-    velocity_wrench,
 )
-from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
+from uas_coverage_env.vehicle.lpv import clip_wrench, fly_kinematics
 
 ROUNDING = 1e-9
 

@@ -9,7 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from uas_coverage_env.vehicle import (
+from uas_coverage_env.vehicle import lpv_step
+from uas_coverage_env.vehicle.inner_loop import (
+    acceleration_wrench,
+    reseed_reference,
+    velocity_climb_wrench,
+    velocity_wrench,
+)
+from uas_coverage_env.vehicle.layout import (
     DOD,
     LIFT,
     N_INPUTS,
@@ -27,13 +34,8 @@ from uas_coverage_env.vehicle import (
     X,
     Y,
     Z,
-    acceleration_wrench,
-    fly_kinematics,
-    lpv_step,
-    reseed_reference,
-    velocity_climb_wrench,
-    velocity_wrench,
 )
+from uas_coverage_env.vehicle.lpv import fly_kinematics
 
 ROUNDING = 1e-9
 ALPHA, RATE, TILT, SPEED, DOWN, UP, OVER_LIFT, UNDER_LIFT, YAW_TORQUE = range(9)

@@ -18,7 +18,9 @@ from flying import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uas_coverage_env.vehicle import (
+from uas_coverage_env.vehicle import delta_thrust, linear_model, lpv_step
+from uas_coverage_env.vehicle.inner_loop import velocity_wrench
+from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
     LIFT,
@@ -36,13 +38,8 @@ from uas_coverage_env.vehicle import (
     X,
     Y,
     Z,
-    clip_wrench,
-    delta_thrust,
-    fly_kinematics,
-    linear_model,
-    lpv_step,
-    velocity_wrench,
 )
+from uas_coverage_env.vehicle.lpv import clip_wrench, fly_kinematics
 
 polarisations = st.floats(0.0, 0.4)
 depths = st.floats(0.0, 0.95)

@@ -5,18 +5,14 @@ import pytest
 from flying import NAMES, load
 
 from uas_coverage_env.vehicle import (
-    DOD,
-    N_INPUTS,
-    N_STATES,
-    U_TH,
-    VX,
     compile_vehicle,
     linear_model,
     lpv_step,
-    open_circuit_V,
     open_circuit_voltage,
     simulate_battery,
 )
+from uas_coverage_env.vehicle.discharge import open_circuit_V
+from uas_coverage_env.vehicle.layout import DOD, N_INPUTS, N_STATES, U_TH, VX
 
 
 def changed(name, section, **values):

@@ -21,7 +21,9 @@ from flying import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uas_coverage_env.vehicle import (
+from uas_coverage_env.vehicle import compile_vehicle, exact_delta_thrust, lpv_step, plant_step
+from uas_coverage_env.vehicle.inner_loop import velocity_wrench
+from uas_coverage_env.vehicle.layout import (
     DELTA_THRUST,
     DOD,
     LIFT,
@@ -40,13 +42,8 @@ from uas_coverage_env.vehicle import (
     X,
     Y,
     Z,
-    clip_wrench,
-    compile_vehicle,
-    exact_delta_thrust,
-    lpv_step,
-    plant_step,
-    velocity_wrench,
 )
+from uas_coverage_env.vehicle.lpv import clip_wrench
 from uas_coverage_env.vehicle.plant import mix
 from uas_coverage_env.vehicle.powertrain import electrical_power_W
 

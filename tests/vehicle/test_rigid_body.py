@@ -7,7 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from uas_coverage_env.vehicle import (
+from uas_coverage_env.vehicle import compile_vehicle, lpv_step, plant_step
+from uas_coverage_env.vehicle.attitude import body_attitude, tilts_and_turn
+from uas_coverage_env.vehicle.layout import (
     DOD,
     N_INPUTS,
     N_STATES,
@@ -20,11 +22,6 @@ from uas_coverage_env.vehicle import (
     WX,
     WZ,
     X,
-    body_attitude,
-    compile_vehicle,
-    lpv_step,
-    plant_step,
-    tilts_and_turn,
 )
 from uas_coverage_env.vehicle.plant import _rigid_body
 

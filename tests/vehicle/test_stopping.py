@@ -9,7 +9,8 @@ from small_worlds import meadow
 
 from uas_coverage_env.autopilot.lookahead import fly_and_brake
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX, VY, VZ, load_vehicle
+from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.layout import DOD, VX, VY, VZ
 from uas_coverage_env.vehicle.stopping import AT_REST_MPS, stopping_of
 from uas_coverage_env.world import GoTo, Velocity
 

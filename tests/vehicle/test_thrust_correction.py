@@ -11,16 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import uas_coverage_env.vehicle
-from uas_coverage_env.vehicle import (
-    N_STATES,
-    THETA,
-    VX,
-    VZ,
-    delta_thrust,
-    exact_delta_thrust,
-    fit_thrust_correction,
-)
+from uas_coverage_env.vehicle import delta_thrust, exact_delta_thrust
+from uas_coverage_env.vehicle.layout import N_STATES, THETA, VX, VZ
 from uas_coverage_env.vehicle.powertrain import electrical_power_W
+from uas_coverage_env.vehicle.thrust_correction import fit_thrust_correction
 
 
 def level_flight_N(name, speed_mps):

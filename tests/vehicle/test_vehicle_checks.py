@@ -9,21 +9,18 @@ from test_vehicle_params import SHIPPED, changed_file
 
 from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse
 from uas_coverage_env.vehicle import (
-    DOD,
-    N_INPUTS,
-    N_STATES,
-    U_TH,
     VehicleParams,
-    battery_segments,
     compile_vehicle,
     derived,
-    fit_thrust_correction,
     load_vehicle,
     lpv_step,
     plant_step,
 )
+from uas_coverage_env.vehicle.battery import battery_segments
 from uas_coverage_env.vehicle.checks import TOLERANCE
+from uas_coverage_env.vehicle.layout import DOD, N_INPUTS, N_STATES, U_TH
 from uas_coverage_env.vehicle.parts import computed_fields
+from uas_coverage_env.vehicle.thrust_correction import fit_thrust_correction
 
 CONTRADICTIONS = {
     "mass": ("mass_kg", 3.77, r"power\.hover_W is 193\.816, but .* take 612\.5 W"),

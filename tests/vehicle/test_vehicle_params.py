@@ -8,12 +8,8 @@ from pydantic import ValidationError
 
 import uas_coverage_env.vehicle
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.vehicle import (
-    compile_vehicle,
-    load_vehicle,
-    return_threshold,
-    vehicle_names,
-)
+from uas_coverage_env.vehicle import compile_vehicle, load_vehicle, vehicle_names
+from uas_coverage_env.vehicle.params import return_threshold
 
 SHIPPED = Path(uas_coverage_env.vehicle.__file__).with_name("s500_v2.toml")
 

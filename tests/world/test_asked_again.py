@@ -9,19 +9,16 @@ from hypothesis import strategies as st
 from small_worlds import meadow, waypoint
 
 from uas_coverage_env import World, load_planner, rollout
+from uas_coverage_env.entities.state import FLYING, SWAPPING
 from uas_coverage_env.files.strict_toml import InputError, parse
-from uas_coverage_env.flight import (
-    Flight,
-    SceneHistory,
-    accomplished,
-    coverage,
-    rest_of,
-)
-from uas_coverage_env.flight.metrics import open_waypoints
-from uas_coverage_env.scenario import Room, Scenario, warnings
+from uas_coverage_env.flight import Flight, rest_of
+from uas_coverage_env.flight.metrics import accomplished, coverage, open_waypoints
+from uas_coverage_env.flight.scene_history import SceneHistory
+from uas_coverage_env.scenario import Scenario, warnings
 from uas_coverage_env.scenario.packs import Sorties
+from uas_coverage_env.scenario.room import Room
 from uas_coverage_env.uas_coverage_v0 import parallel_env
-from uas_coverage_env.world import FLYING, SWAPPING, GoTo, Velocity
+from uas_coverage_env.world import GoTo, Velocity
 
 STARTS_M = ((20.0, 20.0, -10.0), (20.0, 100.0, -10.0))
 NEAR, FAR = (

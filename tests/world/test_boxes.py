@@ -7,7 +7,7 @@ import pytest
 
 from uas_coverage_env import generate_scenario
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.geometry import segment_clearance
+from uas_coverage_env.geometry.segments import segment_clearance
 from uas_coverage_env.world import build_arena
 from uas_coverage_env.world.broad_phase import (
     BLOCK,

@@ -5,18 +5,9 @@ import numpy as np
 import pytest
 from small_worlds import meadow
 
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME, KIND_NAMES, command_mode, pack
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import (
-    COMMAND_DTYPE,
-    HOME,
-    KIND_NAMES,
-    Acceleration,
-    GoTo,
-    Velocity,
-    Wrench,
-    command_mode,
-    pack,
-)
+from uas_coverage_env.world import Acceleration, GoTo, Velocity, Wrench
 
 NAMES = ("uas_1", "uas_2")
 GOOD = {"uas_1": Velocity(1.0, 2.0, 3.0), "uas_2": GoTo(0)}

@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, mover, waypoint
 
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
+from uas_coverage_env.entities.state import FLYING, LOST
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, VX, VY, X
-from uas_coverage_env.world import CONTACT_NAMES, FLYING, LOST, GoTo, Velocity
+from uas_coverage_env.vehicle.layout import DOD, VX, VY, X
+from uas_coverage_env.world import GoTo, Velocity
 
 
 def hover(world):

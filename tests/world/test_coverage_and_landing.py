@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
+from uas_coverage_env.entities.state import FLYING, LANDED, LOST
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import DOD, U_TH, VX, VZ
-from uas_coverage_env.world import FLYING, LANDED, LOST, GoTo, Velocity
+from uas_coverage_env.vehicle.layout import DOD, U_TH, VX, VZ
+from uas_coverage_env.world import GoTo, Velocity
 
 
 def test_what_lies_within_reach_of_a_start_is_covered_at_time_zero():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.flight import rollout, summary
+from uas_coverage_env.flight import rollout
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import generate_scenario, warnings
@@ -14,7 +15,7 @@ from uas_coverage_env.simulation import World
 from uas_coverage_env.world import GoTo, Velocity
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-import independent_check
+from uas_coverage_env import independent_check
 
 HOUSE = box("house", (60.0, 60.0, -9.0), (90.0, 90.0, 0.0), 1.0)
 

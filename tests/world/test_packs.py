@@ -5,11 +5,12 @@ import pytest
 from small_worlds import meadow, mover, waypoint
 
 from uas_coverage_env import World
+from uas_coverage_env.entities.state import FLYING, LANDED, LOST, SWAPPING
 from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.packs import Sorties
-from uas_coverage_env.vehicle import DOD, X, Y, Z
-from uas_coverage_env.world import FLYING, LANDED, LOST, SWAPPING, GoTo, Velocity
+from uas_coverage_env.vehicle.layout import DOD, X, Y, Z
+from uas_coverage_env.world import GoTo, Velocity
 
 STARTS_M = ((20.0, 20.0, -10.0), (20.0, 100.0, -10.0))
 NEAR, NEXT, FAR = (

@@ -8,7 +8,8 @@ from uas_coverage_env import World, rollout
 from uas_coverage_env.autopilot.lookahead import fly_and_brake
 from uas_coverage_env.features import constant_wind
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.scenario import LEVELS, with_disturbances
+from uas_coverage_env.scenario import with_disturbances
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 from uas_coverage_env.world import GoTo, Velocity, build_arena
 from uas_coverage_env.world.obstacles import ROUTE_MARGIN_M
 from uas_coverage_env.world.tubes import UNKNOWN_M
@@ -31,7 +32,7 @@ def test_where_nothing_is_stated_the_least_is_kept():
     assert arena.obstacles["wall_m"] == build_arena(TOWN).obstacles["wall_m"]
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("level", DISTURBANCE_LEVELS)
 def test_the_tube_grows_along_the_horizon_and_planners_know_it_as_the_world_does(level):
     scenario = in_wind(level)
     arena = World(scenario).arena
@@ -47,10 +48,10 @@ def test_the_tube_grows_along_the_horizon_and_planners_know_it_as_the_world_does
     np.testing.assert_array_equal(planners.nodes_m, arena.nodes_m)
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("level", DISTURBANCE_LEVELS)
 def test_turbulence_and_gusts_seldom_lead_a_prediction_out_of_its_tube(level):
     scenario = in_wind(level, seed=3)
-    mean_mps = LEVELS[level].mean_mps[1]
+    mean_mps = DISTURBANCE_LEVELS[level].mean_mps[1]
     scenario = scenario.model_copy(
         update={
             "wind": scenario.wind.model_copy(update={"mean_mps": mean_mps}),

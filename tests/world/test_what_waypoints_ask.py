@@ -8,7 +8,7 @@ from uas_coverage_env import Flight, load_planner, load_scenario, rollout
 from uas_coverage_env.flight import covered_at, rest_of
 from uas_coverage_env.scenario import Scenario, Sensor
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import VX, VZ, Z
+from uas_coverage_env.vehicle.layout import VX, VZ, Z
 from uas_coverage_env.world import GoTo, Velocity
 from uas_coverage_env.world.coverage import covering_samples
 

@@ -19,8 +19,10 @@ from uas_coverage_env.autopilot.control import steered_wrench
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
 from uas_coverage_env.entities.commands import CLIMB, VELOCITY, WRENCH
 from uas_coverage_env.entities.state import CONSUMPTION, EXPECTED, EXPECTED_DOD, SINK, WIND
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES, fly_kinematics, lpv_step, plant_step
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle import lpv_step, plant_step
+from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.vehicle.tube import FORGETS_S
 
 SEES_CONSUMPTION_S = 30.0

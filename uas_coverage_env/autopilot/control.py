@@ -2,13 +2,13 @@
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.entities.commands import ACCELERATION, CLIMB, N_VALUES, VELOCITY
-from uas_coverage_env.vehicle import (
+from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.inner_loop import (
     acceleration_wrench,
-    clip_wrench,
     velocity_climb_wrench,
     velocity_wrench,
 )
-from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.lpv import clip_wrench
 
 
 @kernel

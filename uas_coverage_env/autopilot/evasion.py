@@ -29,7 +29,7 @@ from uas_coverage_env.autopilot.lookahead import (
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel, kernel, stack_array
 from uas_coverage_env.entities.commands import CLIMB
-from uas_coverage_env.geometry import cylinder_clearance
+from uas_coverage_env.geometry.segments import cylinder_clearance
 
 _ROOM, _NORTH, _EAST, _DOWN = range(4)
 """Of the best flight so far: its room [m] and its velocity [m/s]."""

@@ -22,7 +22,7 @@ from uas_coverage_env.compiled.kernels import (
 from uas_coverage_env.entities.commands import GO_TO, HOME, VELOCITY, GoTo, Velocity, command_mode
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import FLYING, WIND, WorldState
-from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.arena import Arena
 from uas_coverage_env.world.height import lowest_altitude

@@ -7,15 +7,16 @@ from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import kernel, rare_kernel, stack_array
 from uas_coverage_env.entities.commands import WRENCH
 from uas_coverage_env.entities.state import FLYING, WIND
-from uas_coverage_env.geometry import cylinder_clearance, segment_clearance, signed_distance
-from uas_coverage_env.vehicle import (
-    N_INPUTS,
-    N_STATES,
-    fly_kinematics,
-    plant_step,
-    reseed_reference,
+from uas_coverage_env.geometry.segments import (
+    cylinder_clearance,
+    segment_clearance,
+    signed_distance,
 )
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle import plant_step
+from uas_coverage_env.vehicle.inner_loop import reseed_reference
+from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.world.contacts import face_between, moving_clearance
 from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.bound.legs import (
-    Legs,
+    LegBounds,
     directed_triples,
     end_costs,
     straight_directions,
@@ -50,7 +50,9 @@ class Carried:
         reach_m: (n+1,) how far so many steps lead at most.
     """
 
-    def __init__(self, legs: Legs, passing: Passing, turning: Turning, reach_m: FloatArray) -> None:
+    def __init__(
+        self, legs: LegBounds, passing: Passing, turning: Turning, reach_m: FloatArray
+    ) -> None:
         self._legs, self._passing, self._turning = legs, passing, turning
         self._reach_m = reach_m
         self._n, self._n_nodes = legs.before.shape

@@ -36,7 +36,7 @@ class Places(NamedTuple):
     landing_distance_m: float
 
 
-class Legs(NamedTuple):
+class LegBounds(NamedTuple):
     """The way between nodes: how many steps it takes at least, and where they are counted.
 
     Attributes:
@@ -56,7 +56,7 @@ class Legs(NamedTuple):
     landing_steps: IntArray
 
 
-def legs_between(places: Places, reach_m: FloatArray, reach_from_rest_m: FloatArray) -> Legs:
+def legs_between(places: Places, reach_m: FloatArray, reach_from_rest_m: FloatArray) -> LegBounds:
     """The legs of a mission.
 
     Args:
@@ -77,7 +77,7 @@ def legs_between(places: Places, reach_m: FloatArray, reach_from_rest_m: FloatAr
     before[:, starts] = np.minimum(LONGEST, steps[:, starts] // 3)
     landing_steps = np.clip(steps[:, ends] // 2, 1, _LANDING)
     after[:, ends] = steps[:, ends] - landing_steps
-    return Legs(
+    return LegBounds(
         centre_m,
         radius_m,
         np.minimum(before, LONGEST),
@@ -87,7 +87,7 @@ def legs_between(places: Places, reach_m: FloatArray, reach_from_rest_m: FloatAr
     )
 
 
-def straight_directions(legs: Legs) -> FloatArray:
+def straight_directions(legs: LegBounds) -> FloatArray:
     """(W, N, 2) from each waypoint to each node, of unit length; zero where they coincide."""
     n = len(legs.before)
     way_m = legs.centre_m[None] - legs.centre_m[:n, None]
@@ -95,7 +95,7 @@ def straight_directions(legs: Legs) -> FloatArray:
     return np.divide(way_m, length_m, out=np.zeros_like(way_m), where=length_m > 1e-9)
 
 
-def with_middles(legs: Legs) -> BoolArray:
+def with_middles(legs: LegBounds) -> BoolArray:
     """(W, N) the legs whose middle, seen from above, lies between the circles of two waypoints."""
     n = len(legs.before)
     half_m = 0.5 * np.linalg.norm(legs.centre_m[None] - legs.centre_m[:n, None], axis=2)
@@ -104,7 +104,7 @@ def with_middles(legs: Legs) -> BoolArray:
     return found
 
 
-def steps_to_middles(legs: Legs, reach_m: FloatArray, step_m: float) -> Legs:
+def steps_to_middles(legs: LegBounds, reach_m: FloatArray, step_m: float) -> LegBounds:
     """The legs with the steps up to their middle, and from it, in place of half of their steps.
 
     Args:
@@ -123,7 +123,7 @@ def steps_to_middles(legs: Legs, reach_m: FloatArray, step_m: float) -> Legs:
     )
 
 
-def end_costs(legs: Legs, turning: Turning, directions: FloatArray) -> FloatArray:
+def end_costs(legs: LegBounds, turning: Turning, directions: FloatArray) -> FloatArray:
     """(W, N) of setting off and landing, with the half of the leg next to a home; else zero."""
     n, n_nodes = legs.before.shape
     uas = (n_nodes - n) // 2
@@ -138,14 +138,16 @@ def end_costs(legs: Legs, turning: Turning, directions: FloatArray) -> FloatArra
     return cost
 
 
-def triples(legs: Legs, turning: Turning) -> FloatArray:
+def triples(legs: LegBounds, turning: Turning) -> FloatArray:
     """(W, N, N) the least cost of each triple, in whichever direction it is flown; symmetric."""
     out = straight_directions(legs)
     cost = directed_triples(legs, turning, -out, out)
     return np.minimum(cost, cost.transpose(0, 2, 1))
 
 
-def directed_triples(legs: Legs, turning: Turning, into: FloatArray, out: FloatArray) -> FloatArray:
+def directed_triples(
+    legs: LegBounds, turning: Turning, into: FloatArray, out: FloatArray
+) -> FloatArray:
     """The cost of each triple: half of either leg, the radius, the turn, and the ends of a route.
 
     Args:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.bound.carried import Carried
 from uas_coverage_env.bound.legs import (
-    Legs,
+    LegBounds,
     Places,
     legs_between,
     steps_to_middles,
@@ -165,7 +165,7 @@ class MissionBound:
         return turning_of_fleet(self._vehicles, ends.dt_s, STEPS, ends.landing_speed_mps)
 
     @cached_property
-    def _legs(self) -> Legs:
+    def _legs(self) -> LegBounds:
         turning = self._steps_turning
         return legs_between(self._places, turning.reach_m, turning.reach_from_rest_m)
 

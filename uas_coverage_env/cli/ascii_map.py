@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.text import Text
 
+from uas_coverage_env.entities.state import LOST
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world import LOST, SwarmState
+from uas_coverage_env.world import SwarmState
 
 _MOST_COLUMNS = 72
 _LEAST_ROWS, _LEAST_COLUMNS = 4, 16

@@ -10,10 +10,12 @@ import typer
 
 from uas_coverage_env.cli.compilation import compiling_for_flight
 from uas_coverage_env.cli.flights import keep_flight, report_flight
+from uas_coverage_env.cli.options import ReplaceFlightOption
 from uas_coverage_env.cli.output import console, loaded
 from uas_coverage_env.cli.progress import shown
 from uas_coverage_env.cli.run import free_directory
-from uas_coverage_env.flight import check_directory, load_planner, rollout
+from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight.directory import check_directory
 from uas_coverage_env.replay import write_replay
 from uas_coverage_env.replay.recorded import write_recorded_page
 
@@ -27,9 +29,7 @@ def demo(
     out: Annotated[
         Path | None, typer.Option(help="Flight directory; default: flights/demo, numbered.")
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the flight in --out.")
-    ] = False,
+    overwrite: ReplaceFlightOption = False,
     no_open: Annotated[
         bool, typer.Option("--no-open", help="Do not open the page in a browser.")
     ] = False,

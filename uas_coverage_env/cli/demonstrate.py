@@ -1,4 +1,4 @@
-"""`uas-coverage demonstrate`: what a planner does on many missions, as data to learn from."""
+"""`uas-coverage planner demonstrate`: what a planner does, as data to learn from."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,11 +10,13 @@ from uas_coverage_env.cli.options import (
     BackendOption,
     JobsOption,
     OverwriteOption,
-    options_of,
+    PlannerOptions,
+    typed_options,
 )
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_former
-from uas_coverage_env.leaderboard import FLOWN, PlannerSpec, Row, Sweep, scenarios_of
+from uas_coverage_env.leaderboard import PlannerSpec, Row, Sweep, scenarios_of
+from uas_coverage_env.leaderboard.row import FLOWN
 from uas_coverage_env.runner.jobs import Workers
 from uas_coverage_env.runner.store import opened
 
@@ -31,12 +33,9 @@ def demonstrate_command(
         Path, typer.Option(help="Folder of the missions; resumed, and added to, if it exists.")
     ],
     planner: Annotated[
-        str, typer.Option(metavar="NAME", help="The planner that demonstrates; see `planners`.")
+        str, typer.Option(metavar="NAME", help="The planner that demonstrates; see `planner list`.")
     ] = "trajectory",
-    option: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KEY=VALUE", help="Set a planner option; may be repeated."),
-    ] = None,
+    option: PlannerOptions = None,
     seed: Annotated[int, typer.Option(help="Of the planner.", min=0, max=LAST_KEPT_SEED)] = 0,
     backend: BackendOption = "process",
     jobs: JobsOption = None,
@@ -47,7 +46,7 @@ def demonstrate_command(
     A compressed file of NumPy arrays for each mission; `Demonstrations.load` reads them all
     (docs/imitation.md). Ctrl-C or a kill loses no mission that was flown: the same command goes on.
     """
-    spec = PlannerSpec.named(planner, planner, options_of(option or ()))
+    spec = PlannerSpec.named(planner, planner, typed_options(option or ()))
     sweep = Sweep(scenarios_of(scenarios), {planner: spec}, range(seed, seed + 1))
     # of one planner; other missions of it can be added
     asked = {"command": "demonstrate", **sweep.description()}

@@ -1,15 +1,18 @@
 """`uas-coverage figure`: a figure of a flight, of a comparison or of trainings, for print."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from uas_coverage_env.cli.output import console
-from uas_coverage_env.cli.replay import check_file
+from uas_coverage_env.cli.options import ReplaceFileOption, check_file
+from uas_coverage_env.cli.output import console, extra
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.leaderboard import SCORES, leaderboard_figure, published, scores_of
+from uas_coverage_env.leaderboard import leaderboard_figure, read_comparison, scores_of
+from uas_coverage_env.leaderboard.publish import SCORES
+from uas_coverage_env.replay.figure_kinds import KINDS, figure_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,7 +20,12 @@ if TYPE_CHECKING:
 _SUFFIXES = (".pdf", ".svg", ".png")
 _MM_PER_IN = 25.4
 _LEADERBOARD, _TRAINING = "leaderboard", "training"
-_FLIGHT_KINDS = "map, battery, modes, decision-time"
+_FLIGHT_KINDS = ", ".join(KINDS)
+
+
+Step = Annotated[
+    int | None, typer.Option(min=0, help="The sample that the map shows; default: the last.")
+]
 
 
 def figure(
@@ -30,12 +38,14 @@ def figure(
         ),
     ],
     kind: Annotated[
-        Literal["map", "battery", "modes", "decision-time", "leaderboard", "training"],
-        typer.Option(help="Figure to draw; map and battery are the paper's Fig. 1 to 3."),
+        str,
+        typer.Option(
+            metavar="KIND",
+            help=f"{_FLIGHT_KINDS}, {_LEADERBOARD} or {_TRAINING}; map and battery are the paper's "
+            "Fig. 1 to 3.",
+        ),
     ],
-    step: Annotated[
-        int | None, typer.Option(min=0, help="The sample that the map shows; default: the last.")
-    ] = None,
+    step: Step = None,
     width: Annotated[
         float | None,
         typer.Option(
@@ -52,14 +62,13 @@ def figure(
     out: Annotated[
         Path | None, typer.Option(help="A .pdf, .svg or .png; default: DIR/KIND.pdf.")
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the file that --out names.")
-    ] = False,
+    overwrite: ReplaceFileOption = False,
 ) -> None:
     """Draw a figure as a vector file (needs the extra `view`).
 
     DIR/KIND.pdf is drawn anew each time; a file that --out names is replaced only on request.
     """
+    check_choice("--kind", kind, (*KINDS, _LEADERBOARD, _TRAINING))
     for directory in directories:
         if not directory.is_dir():
             raise InputError(f"{directory}: there is no such directory")
@@ -69,19 +78,10 @@ def figure(
         raise InputError(f"--step is for --kind map; a figure of kind {kind} shows all steps")
     if len(directories) > 1 and kind != _TRAINING:
         raise InputError(f"--kind {kind} shows one directory; {len(directories)} were given")
-    try:
-        from uas_coverage_env.replay.figures import (
-            CURVE,
-            WIDTH_IN,
-            look,
-            save_figure,
-        )
-    except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] != "matplotlib":
-            raise
-        raise InputError(
-            'a figure needs matplotlib: pip install "uas-coverage-env[view]"'
-        ) from error
+    with extra("view", "a figure needs", ["matplotlib"]):
+        from uas_coverage_env.replay.figures import save_figure
+        from uas_coverage_env.replay.figures.style import WIDTH_IN, look
+        from uas_coverage_env.replay.figures.training import CURVE
     for directory in directories:
         _check_sort(directory, kind, CURVE)
     width_in = WIDTH_IN if width is None else width / _MM_PER_IN
@@ -91,16 +91,17 @@ def figure(
 
 
 def _drawn(directories: list[Path], kind: str, step: int | None) -> "Figure":
-    from uas_coverage_env.replay.figures import KINDS, map_figure, training_figure, with_baselines
+    from uas_coverage_env.replay.figures import map_figure, training_figure
+    from uas_coverage_env.replay.figures.training import with_baselines
 
     if kind == _LEADERBOARD:
-        rows, reference = published(directories[0])
+        rows, reference = read_comparison(directories[0])
         return leaderboard_figure(scores_of(rows, reference), rows, reference)
     if kind == _TRAINING:
         return training_figure(with_baselines(_named(directories)))
     if step is not None:
         return map_figure(Flight.load(directories[0]), step=step)
-    return KINDS[kind](Flight.load(directories[0]))
+    return figure_of(kind)(Flight.load(directories[0]))
 
 
 def _check_sort(directory: Path, kind: str, curve: str) -> None:

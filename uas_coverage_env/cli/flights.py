@@ -9,19 +9,17 @@ from uas_coverage_env.cli.figures_of_flight import (
     ENDED,
     beside_the_best,
     by_uas,
+    failed_figures,
     left_open,
     verdict,
 )
-from uas_coverage_env.flight import (
-    Flight,
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.metrics import (
     accomplished,
-    draw_flight,
-    fallback_reasons,
-    filtered_share,
-    packs_used,
-    summary,
 )
-from uas_coverage_env.flight.interruption import interruptions_noted
+from uas_coverage_env.flight.picture import draw_flight
+from uas_coverage_env.interruptions import signals_noted
 
 
 def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> bool:
@@ -30,7 +28,7 @@ def keep_flight(flight: Flight, directory: Path, *, overwrite: bool) -> bool:
     Returns:
         Whether one has come.
     """
-    with interruptions_noted() as interrupted:
+    with signals_noted() as interrupted:
         flight.save(directory, overwrite=overwrite)
         draw_flight(flight, directory / "map.png")
         return interrupted()
@@ -57,18 +55,20 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
         markup=False,
     )
     if flight.swaps:
-        used = ", ".join(f"{name} {packs}" for name, packs in packs_used(flight).items())
+        used = ", ".join(f"{name} {packs}" for name, packs in result["packs"].items())
         screen.print(f"{len(flight.swaps)} swaps; packs used: {used}", markup=False)
     if any(decision.duration_s for decision in flight.decisions):  # none in a log
         times = ", ".join(
             f"{1e3 * t:.2f} ms {name}" for name, t in result["decision_time_s"].items()
         )
-        counts = fallback_reasons(flight).items()
+        counts = result.get("fallback_reasons", {}).items()
         why = f" ({', '.join(f'{n} {reason}' for reason, n in counts)})" if counts else ""
         screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks{why}", markup=False)
     if flight.safety_filter:
-        share = filtered_share(flight)
+        share = result["filtered_share"]
         screen.print(f"the safety filter replaced {share:.1%} of the commands", markup=False)
+    for line in failed_figures(flight):
+        screen.print(line, markup=False, style="yellow")
     screen.print(verdict(flight), markup=False, style="green" if accomplished(flight) else "red")
     if best := beside_the_best(flight):
         screen.print(best, markup=False)

@@ -1,13 +1,23 @@
 """Commands that are imported when they run: to list them, none of the package's is imported."""
 
-from collections.abc import Callable, Sequence
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from uas_coverage_env.cli.retired import follower
+from uas_coverage_env.files.errors import InputError
+
 MARKUP = "markdown"
+HELP = {"help_option_names": ["-h", "--help"]}
 
 
 def without_type_of_flags(params: Sequence[Any]) -> list[Any]:
@@ -18,31 +28,52 @@ def without_type_of_flags(params: Sequence[Any]) -> list[Any]:
     return list(params)
 
 
-class CommandEntry(NamedTuple):
-    """A command of the command line."""
+class Located(NamedTuple):
+    """A command that is not imported before it is called."""
 
-    name: str
+    place: str
+    """MODULE:NAME of a function as typer takes it."""
     load: Callable[[], Any]
-    """Imports it: a function as typer takes it, or a `typer.Typer` of further commands."""
-    summary: str = ""
-    """Its line in the list of commands; without one, it is imported for its own."""
+    """Imports it."""
+
+    def summary(self) -> str:
+        """The first paragraph of its docstring, read from its file; empty where there is none."""
+        module, _, name = self.place.partition(":")
+        with suppress(Exception):  # whatever is wrong is told when it is called
+            spec = find_spec(module)
+            source = Path(str(spec and spec.origin)).read_text("utf-8")
+            for node in ast.parse(source).body:
+                if isinstance(node, ast.FunctionDef) and node.name == name:
+                    return " ".join((ast.get_docstring(node) or "").partition("\n\n")[0].split())
+        return ""
 
 
-def at(location: str) -> Callable[[], Any]:
-    """What imports MODULE:NAME."""
+class GroupOfCommands(NamedTuple):
+    """Commands that are typed behind a common word."""
 
-    def load() -> Any:
-        module, _, name = location.partition(":")
-        return getattr(import_module(module), name)
+    meaning: str
+    commands: Mapping[str, Located]
 
-    return load
+    def summary(self) -> str:
+        """Its line in the list of commands."""
+        return self.meaning
+
+
+CommandEntry = Located | GroupOfCommands
+
+
+def at(location: str) -> Located:
+    """The command MODULE:NAME of this package."""
+    module, _, name = location.partition(":")
+    module = f"{__package__}.{module}"
+    return Located(f"{module}:{name}", lambda: getattr(import_module(module), name))
 
 
 class _NotImported(TyperCommand):
     """What stands for a command in a list."""
 
-    def __init__(self, entry: CommandEntry) -> None:
-        super().__init__(name=entry.name, help=entry.summary)
+    def __init__(self, name: str, entry: CommandEntry) -> None:
+        super().__init__(name=name)
         self.entry = entry
 
 
@@ -51,20 +82,31 @@ class LazyGroup(TyperGroup):
 
     _lists = False
 
-    def add_entries(self, entries: Sequence[CommandEntry]) -> None:
-        """Add commands; of two that have one name, the later one counts."""
-        for entry in entries:
-            self.add_command(_NotImported(entry))
+    def add_entries(self, entries: Mapping[str, CommandEntry]) -> None:
+        """Add commands, by name."""
+        for name, entry in entries.items():
+            self.add_command(_NotImported(name, entry))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name; where commands are only listed, what stands for it."""
         command = super().get_command(ctx, cmd_name)
-        if not isinstance(command, _NotImported) or (self._lists and command.entry.summary):
+        if not isinstance(command, _NotImported):
             return command
-        command = _command_of(command.entry)
-        for each in (command, *getattr(command, "commands", {}).values()):
-            without_type_of_flags(each.get_params(ctx))
+        if self._lists:
+            command.help = command.entry.summary()
+            if command.help:
+                return command
+        command = _command_of(cmd_name, command.entry)
+        without_type_of_flags(command.get_params(ctx))
         return command
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that is called; what was one once is answered with what follows it."""
+        if ctx.parent is None and args[0] not in self.commands:
+            said = follower(*args[:2])
+            if said:
+                raise InputError(said)
+        return super().resolve_command(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The options of the group."""
@@ -87,11 +129,26 @@ class LazyGroup(TyperGroup):
             self._lists = False
 
 
-def _command_of(entry: CommandEntry) -> Any:
-    app = made = entry.load()
-    if not isinstance(made, typer.Typer):
+def _command_of(name: str, entry: CommandEntry) -> Any:
+    if isinstance(entry, Located):
         app = typer.Typer(add_completion=False, rich_markup_mode=MARKUP)
-        app.command(entry.name)(made)
-    command = typer.main.get_command(app)
-    command.name = entry.name
+        app.command(name)(entry.load())
+        command = typer.main.get_command(app)
+    else:
+        app = typer.Typer(
+            cls=LazyGroup,
+            invoke_without_command=True,
+            add_completion=False,
+            rich_markup_mode=MARKUP,
+        )
+        app.callback(help=entry.meaning, context_settings=HELP)(_help_unless_called)
+        command = typer.main.get_command(app)
+        assert isinstance(command, LazyGroup)
+        command.add_entries(entry.commands)
+    command.name = name
     return command
+
+
+def _help_unless_called(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())

@@ -1,14 +1,18 @@
 """How the commands speak: plain lines and tables on stdout, warnings on stderr."""
 
 import sys
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from uas_coverage_env.files.errors import InputError
+
 if TYPE_CHECKING:
     from uas_coverage_env.scenario import Scenario
 
-DONE, FAILED = 0, 1
+DONE, FAILED, REFUSED = 0, 1, 2
 
 
 def console(*, quiet: bool = False) -> Console:
@@ -25,6 +29,30 @@ def one_line(text: str) -> str:
     return " ".join(text.split())
 
 
+def warn(lines: Iterable[str]) -> None:
+    """Say on stderr what is doubtful, a line each."""
+    for line in lines:
+        sys.stderr.write(f"warning: {one_line(line)}\n")
+
+
+@contextmanager
+def extra(name: str, what: str, libraries: Collection[str]) -> Iterator[None]:
+    """Say which extra is missing, where what is imported is not installed.
+
+    Args:
+        name: Of the extra.
+        what: That needs it.
+        libraries: Of the extra.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        library = (error.name or "").partition(".")[0]
+        if library not in libraries:
+            raise
+        raise InputError(f'{what} {library}: pip install "uas-coverage-env[{name}]"') from error
+
+
 def loaded(name_or_path: str) -> "Scenario":
     """Load a scenario; what is doubtful about it goes to stderr, a line each."""
     from uas_coverage_env.scenario import (  # a second that help need not take
@@ -33,6 +61,5 @@ def loaded(name_or_path: str) -> "Scenario":
     )
 
     scenario = load_scenario(name_or_path)
-    for warning in warnings(scenario):
-        sys.stderr.write(f"warning: {one_line(warning)}\n")
+    warn(warnings(scenario))
     return scenario

@@ -5,10 +5,11 @@ command is called or listed, so its module should import what is heavy only when
 """
 
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import EntryPoint
 from typing import Any, NoReturn
 
-from uas_coverage_env.cli.lazy import CommandEntry
+from uas_coverage_env.cli.lazy import CommandEntry, Located
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.plugins.installed import entry_points
 from uas_coverage_env.plugins.users_code import described
@@ -16,20 +17,17 @@ from uas_coverage_env.plugins.users_code import described
 GROUP = "uas_coverage.commands"
 
 
-def plugin_entries() -> list[CommandEntry]:
-    """Them all; one that cannot be loaded says so when it is called, and harms no other."""
+def plugin_entries() -> dict[str, CommandEntry]:
+    """Name -> command; one that cannot be loaded says so when it is called, and harms no other."""
     entries = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
-    return [CommandEntry(entry.name, _loader(entry)) for entry in entries]
+    return {entry.name: Located(entry.value, partial(_loaded, entry)) for entry in entries}
 
 
-def _loader(entry: EntryPoint) -> Callable[[], Any]:
-    def load() -> Any:
-        try:
-            return entry.load()
-        except Exception as error:  # whatever another package raises harms no other command
-            return _refusal(entry, error)
-
-    return load
+def _loaded(entry: EntryPoint) -> Any:
+    try:
+        return entry.load()
+    except Exception as error:  # whatever another package raises harms no other command
+        return _refusal(entry, error)
 
 
 def _refusal(entry: EntryPoint, error: Exception) -> Callable[[], NoReturn]:

@@ -13,14 +13,14 @@ from rich.spinner import Spinner
 
 from uas_coverage_env.cli.ascii_map import AsciiMap
 from uas_coverage_env.cli.compilation import compilation_shown
-from uas_coverage_env.cli.live import LiveView
 from uas_coverage_env.cli.watch import FlightWindow
-from uas_coverage_env.draw import NoDisplayError
+from uas_coverage_env.draw.window import NoDisplayError
+from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.flight import Planner, Progress
+from uas_coverage_env.replay.live import LivePage
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import LANDED, LOST
+from uas_coverage_env.vehicle.layout import DOD
 
 _SECONDS_BETWEEN_LINES = 5.0
 _NO_CHARGE = {LANDED: "landed", LOST: "lost"}
@@ -49,7 +49,7 @@ def shown(
     ascii_map = None
     if watch is not None and window is None:
         ascii_map = AsciiMap(scenario, *out.size)
-    server = LiveView(out) if live else None
+    server = _LiveView(out) if live else None
     flown = False
     try:
         with _lines(out, ascii_map) as write:
@@ -134,6 +134,33 @@ def progress_line(progress: Progress) -> str:
             *([] if decision_s is None else [f"decision {three_digits(1e3 * decision_s)} ms"]),
         ]
     )
+
+
+class _LiveView:
+    """Serves the flight from before the first decision until it ends, and says where.
+
+    Args:
+        out: Where to write.
+    """
+
+    def __init__(self, out: Console) -> None:
+        self._out = out
+        self._page: LivePage | None = None
+        self._last: Progress | None = None
+
+    def __call__(self, progress: Progress) -> None:
+        """Show where the flight stands, if somebody looks."""
+        self._last = progress
+        if self._page is None:
+            self._page = LivePage(progress.flown())
+            self._out.print(f"live at {self._page.address}", markup=False)
+        elif self._page.due:
+            self._page.update(progress.flown())
+
+    def close(self) -> None:
+        """Show the rest of the flight to whoever looks, and end the server."""
+        if self._page is not None and self._last is not None:
+            self._page.close(self._last.flown())
 
 
 class _PlainLines:

@@ -5,17 +5,15 @@ from typing import Annotated
 
 import typer
 
+from uas_coverage_env.cli.options import FlightDirectory, SecondFlight, check_file
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay import write_gif, write_replay, write_video
 
 
 def replay(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
-    other: Annotated[
-        Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")
-    ] = None,
+    directory: FlightDirectory,
+    other: SecondFlight = None,
     video: Annotated[
         Path | None, typer.Option(metavar="FILE.mp4", help="Write a video too (extra `view`).")
     ] = None,
@@ -45,17 +43,3 @@ def replay(
     page = directory / (f"replay_with_{other.resolve().name}.html" if other else "replay.html")
     write_replay(flights, page, sources=sources)
     out.print(f"page in {page} ({page.stat().st_size / 1e3:.0f} kB)", markup=False)
-
-
-def check_file(path: Path, suffixes: tuple[str, ...], *, overwrite: bool) -> None:
-    """Make sure that a picture or film can be written there, before it is made.
-
-    Raises:
-        InputError: Another kind of file, or it exists, or its folder does not.
-    """
-    if path.suffix.lower() not in suffixes:
-        raise InputError(f"{path}: should end in {' or '.join(suffixes)}")
-    if path.exists() and not overwrite:
-        raise InputError(f"{path}: exists; give another file or add --overwrite")
-    if not path.parent.is_dir():
-        raise InputError(f"{path.parent}: is no folder; make it first")

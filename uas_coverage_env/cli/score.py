@@ -12,7 +12,8 @@ from uas_coverage_env.cli.output import console
 from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_former
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
-from uas_coverage_env.leaderboard import Entry, PlannerSpec, Row
+from uas_coverage_env.leaderboard import PlannerSpec, Row
+from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.runner.jobs import Workers
 from uas_coverage_env.runner.store import opened
 from uas_coverage_env.tasks.levels import LEVELS
@@ -72,7 +73,7 @@ def score_command(
         flown: dict[str, list[MissionScore]] = {}
         for entry in some:
             if entry.key in found:
-                mission = MissionScore.of(found[entry.key], entry.scenario)
+                mission = MissionScore.of(found[entry.key])
                 flown.setdefault(entry.spec.label, []).append(mission)
         screen.print(f"{LEVELS[name].id}, {split} missions", markup=False)
         # a table in a file is not to be wrapped

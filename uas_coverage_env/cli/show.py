@@ -4,7 +4,6 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,23 +12,24 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from uas_coverage_env.cli.figures_of_flight import (
-    NONE,
     beside_the_best,
     by_uas,
     data,
+    failed_figures,
     figures,
     of_log,
     verdict,
 )
+from uas_coverage_env.cli.options import FlightDirectory, JsonOption, SecondFlight
 from uas_coverage_env.cli.output import console
-from uas_coverage_env.flight import Flight, accomplished
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.figure import NOTHING
+from uas_coverage_env.flight.metrics import accomplished
 
 
 def show(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
-    other: Annotated[
-        Path | None, typer.Argument(metavar="DIR2", help="A second flight, shown beside it.")
-    ] = None,
+    directory: FlightDirectory,
+    other: SecondFlight = None,
     bound: Annotated[
         bool,
         typer.Option(
@@ -37,7 +37,7 @@ def show(
             help="Beside the least energy that the mission takes (10 to 30 s of processor time).",
         ),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the figures of a flight, or of two side by side.
 
@@ -58,7 +58,7 @@ def show(
     columns = [figures(flight) for flight in flights]
     for name in columns[0]:
         cells = [column[name] for column in columns]
-        if any(cell != NONE for cell in cells):
+        if any(cell != NOTHING for cell in cells):
             table.add_row(name, *cells, style="bold" if name == "accomplished" else None)
     if bound:
         for name in ("least energy, Wh", "above it", "fewest steps", "bound computed in, s"):
@@ -73,7 +73,7 @@ def show(
         out.print(each)
         for violation in flight.violations:
             out.print(f"violation: {violation}", markup=False)
-        for line in of_log(flight):
+        for line in (*failed_figures(flight), *of_log(flight)):
             out.print(line, markup=False)
         out.print(verdict(flight), markup=False)
         if best := beside_the_best(flight):
@@ -122,7 +122,7 @@ def _bound(flight: Flight, say: Callable[[str], object]) -> dict[str, Any]:
     least["energy_Wh"] = of_mission.energy_Wh()
     if accomplished(flight):
         say(f"the least energy of {name} in {flight.steps} steps")
-        flown_Wh = data(flight, "")["energy_Wh"]
+        flown_Wh = flight.figures["energy_Wh"]
         in_steps_Wh = of_mission.energy_Wh(flight.steps)
         least |= {"energy_Wh": in_steps_Wh, "above": flown_Wh / in_steps_Wh - 1.0}
     return least | {"computed_in_s": time.perf_counter() - began}
@@ -130,7 +130,7 @@ def _bound(flight: Flight, say: Callable[[str], object]) -> dict[str, Any]:
 
 def _bound_cell(least: dict[str, Any] | None, name: str) -> str:
     if least is None or least["energy_Wh"] is None:
-        return least["why_not"] if least and name.startswith("least") else NONE
+        return least["why_not"] if least and name.startswith("least") else NOTHING
     if name.startswith("above"):
         return "mission not accomplished" if least["above"] is None else f"{least['above']:.1%}"
     return {

@@ -1,8 +1,10 @@
 """Sorties of `uas-coverage run`: a flight directory for each, and one summary."""
 
+import dataclasses
 import json
+import shutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +17,13 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.plain_files import read_text
 from uas_coverage_env.flight import Flight, sorties_summary
+from uas_coverage_env.interruptions import STOPPED
+from uas_coverage_env.scenario import Place
 
 SUMMARY = "sorties.json"
 _MOST_BYTES = 10_000_000
+_PLANNED = "planned"
+"""The flight of an export, beside its files; with a number, a sortie."""
 
 
 def keep_sorties(
@@ -44,6 +50,8 @@ def keep_sorties(
         number = path.name.removeprefix("sortie_")
         if number.isdigit() and int(number) > len(flights):
             sys.stderr.write(f"warning: {path}: is of an earlier run\n")
+    if stopped or result["ended"] == "stopped":
+        return STOPPED
     done = result["left"] == 0 and result["all_home"] and not result["violations"]
     return DONE if done else FAILED
 
@@ -59,11 +67,48 @@ def load_flights(directory: Path) -> list[Flight]:
         return [Flight.load(directory)]
     try:
         count = len(json.loads(read_text(path, _MOST_BYTES))["sorties"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: holds no list of sorties; fly the mission again") from error
+    except (ValueError, KeyError, TypeError):
+        count = 0
     if not count:
         raise InputError(f"{path}: holds no list of sorties; fly the mission again")
     return [Flight.load(directory / f"sortie_{number}") for number in range(1, count + 1)]
+
+
+def keep_planned(flights: Sequence[Flight], out: Path, place: Place | None) -> None:
+    """Keep the flights whose files a directory holds beside these, for `log`.
+
+    Args:
+        flights: Of the export.
+        out: Its directory.
+        place: Of the origin, where the scenario does not say.
+    """
+    for path in out.glob(f"{_PLANNED}*"):
+        if path.is_dir():
+            shutil.rmtree(path)
+    for number, flight in enumerate(flights, start=1):
+        if place is not None:
+            there = flight.scenario.model_copy(update={"place": place})
+            flight = dataclasses.replace(flight, scenario=there)
+        flight.save(out / (_PLANNED if len(flights) == 1 else f"{_PLANNED}_{number}"))
+
+
+def planned_directory(directory: Path) -> Path:
+    """Where the flight is whose files were flown.
+
+    Args:
+        directory: That of the export, or the flight directory itself.
+
+    Raises:
+        InputError: It holds several sorties.
+    """
+    several = sorted(directory.glob(f"{_PLANNED}_*"))
+    if several:
+        raise InputError(
+            f"{directory}: holds {len(several)} sorties; give the one that was flown, as in "
+            f"--plan {several[0]}"
+        )
+    inside = directory / _PLANNED
+    return inside if inside.is_dir() else directory
 
 
 def _report(screen: Console, result: dict[str, Any], directory: Path) -> None:

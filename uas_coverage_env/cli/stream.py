@@ -1,20 +1,24 @@
 """`uas-coverage stream`: a plan flown in time by real or simulated autopilots."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from uas_coverage_env.cli.operations import asked_place, extra
+from uas_coverage_env.cli.operations import asked_place, ops
+from uas_coverage_env.cli.options import FlightDirectory, PlaceOption, check_file, declared, taken
 from uas_coverage_env.cli.output import FAILED, console
-from uas_coverage_env.cli.replay import check_file
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight import Flight
 
 
-def stream(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Flight directory.")],
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What is asked of `stream`; named as in `StreamOptions` where it is one of these."""
+
+    directory: FlightDirectory
     connect: Annotated[
         list[str],
         typer.Option(
@@ -22,66 +26,70 @@ def stream(
             help="Where each UAS is, such as uas_1=udp:127.0.0.1:14550 (udp and udpin listen, "
             "udpout and tcp connect).",
         ),
-    ],
-    lag: Annotated[
+    ]
+    lag_m: Annotated[
         float,
         typer.Option(
-            help="Behind, or off its path, by so much, m, a UAS lets all come to a stand."
+            "--lag", help="Behind, or off its path, by so much, m, a UAS lets all come to a stand."
         ),
-    ] = 5.0,
-    patience: Annotated[
-        float, typer.Option(help="Seconds that all may stand before the stream is given up.")
-    ] = 60.0,
-    on_abort: Annotated[
+    ] = 5.0
+    patience_s: Annotated[
+        float,
+        typer.Option(
+            "--patience", help="Seconds that all may stand before the stream is given up."
+        ),
+    ] = 60.0
+    reaction: Annotated[
         str,
         typer.Option(
+            "--on-abort",
             help="What UAS do then, and on Ctrl-C: home (the way they came), rtl (straight home), "
-            "land or hold; where that is not clear, the next best."
+            "land or hold; where that is not clear, the next best.",
         ),
-    ] = "home",
+    ] = "home"
     late: Annotated[
         float,
         typer.Option(help="Percent that streaming may take longer than planned, or it is refused."),
-    ] = 5.0,
+    ] = 5.0
     track: Annotated[
-        Path | None, typer.Option(help="Table of what was flown (.csv), for `import-log`.")
-    ] = None,
-    place: Annotated[
-        str | None,
-        typer.Option(metavar="LAT,LON", help="Of the origin, for a scenario without [place]."),
-    ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before vehicles arm.")] = False,
+        Path | None, typer.Option(help="Table of what was flown (.csv), for `log`.")
+    ] = None
+    place: PlaceOption = None
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before vehicles arm.")] = False
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace --track where it exists.")
-    ] = False,
-) -> None:
+    ] = False
+
+
+@declared
+def stream(asked: Asked) -> None:
     """Fly a plan in time on ArduPilot or PX4, by MAVLink position targets (extra `ops`).
 
     Ctrl-C gives all vehicles the mode of --on-abort and waits for them to land; a second one ends
     at once.
     """
-    with extra():
-        from uas_coverage_env.operations.export import place_of_flight
+    with ops():
+        from uas_coverage_env.operations.flight_checks import place_of_flight
         from uas_coverage_env.operations.stream import RealClock, StreamOptions, stream_flight
-    if track is not None:
-        check_file(track, (".csv",), overwrite=overwrite)
-    connections = _connections(connect)
-    flight = Flight.load(directory)
-    where = place_of_flight(flight, asked_place(place))
-    if not yes and not _agrees(len(connections)):
+    if asked.track is not None:
+        check_file(asked.track, (".csv",), overwrite=asked.overwrite)
+    connections = _connections(asked.connect)
+    flight = Flight.load(asked.directory)
+    where = place_of_flight(flight, asked_place(asked.place))
+    if not asked.yes and not _agrees(len(connections)):
         raise InputError("vehicles would arm and take off; say yes, or add --yes")
     screen = console()
     ended, table = stream_flight(
         flight,
         where,
         connections,
-        StreamOptions(lag_m=lag, patience_s=patience, reaction=on_abort, late=0.01 * late),
+        taken(StreamOptions, asked, late=0.01 * asked.late),
         RealClock(),
         lambda line: screen.print(line, markup=False),
     )
-    if track is not None:
-        write_atomically(track, table.encode())
-        screen.print(f"what was flown is in {track}", markup=False)
+    if asked.track is not None:
+        write_atomically(asked.track, table.encode())
+        screen.print(f"what was flown is in {asked.track}", markup=False)
     if ended.reason:
         screen.print(f"given up: {ended.reason}", markup=False)
         screen.print(ended.done, markup=False)

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence, Set
 from contextlib import closing
+from functools import partial
 
 import typer
 from rich.console import Console
@@ -12,8 +13,11 @@ from uas_coverage_env.cli.output import FAILED, one_line
 from uas_coverage_env.cli.progress import missions_shown
 from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard import FLOWN, Entry, Row, failures, source_of
+from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.flying import Kept, fly
+from uas_coverage_env.leaderboard.publish import failures
+from uas_coverage_env.leaderboard.row import FLOWN
+from uas_coverage_env.leaderboard.sweep import Entry, source_of
 from uas_coverage_env.runner.jobs import Job, WorkerLostError, Workers
 from uas_coverage_env.runner.store import Store
 
@@ -25,6 +29,8 @@ def fly_and_keep(
     screen: Console,
     kept: Kept = "row",
     again: Set[str] = frozenset(),
+    *,
+    check: bool = False,
 ) -> Exception | KeyboardInterrupt | None:
     """Fly what the store lacks; returns what ended it before its end, see `end_with`.
 
@@ -35,7 +41,10 @@ def fly_and_keep(
         screen: Where it shows how far it is.
         kept: What is kept of each flight.
         again: Keys of flights that are flown anew where the store holds them.
+        check: Whether the independent checker judges each; those that it has not are flown anew.
     """
+    if check:
+        again |= {row.key for row in store.rows() if row.status == FLOWN and row.verdict is None}
     there = store.keys() - again
     todo = [entry for entry in entries if entry.key not in there]
     if todo and workers.backend == "process":
@@ -45,8 +54,8 @@ def fly_and_keep(
             compile_flight(
                 first.scenario, return_mode=True, safety_filter=bool(first.safety_filter)
             )
-    source = source_of(entries)
-    jobs = [Job(entry.key, fly, (entry, source, kept)) for entry in todo]
+    source, call = source_of(entries), partial(fly, check=check)
+    jobs = [Job(entry.key, call, (entry, source, kept)) for entry in todo]
     try:
         with (
             missions_shown(screen, len(entries), len(entries) - len(todo)) as told,
@@ -90,18 +99,18 @@ def refuse_former(store: Store[Row], entries: Sequence[Entry]) -> None:
 
 
 def end_with(rows: Sequence[Row], trouble: BaseException | None) -> None:
-    """Say what could not be flown, and end a command; what was flown is kept.
+    """Say what is wrong with the flights, see `failures`, and end a command; they are kept.
 
     Raises:
         KeyboardInterrupt: It was stopped by hand.
-        typer.Exit: Something could not be flown.
+        typer.Exit: Something is wrong with one, or it was not flown.
     """
-    failed = [row for row in rows if row.status != FLOWN]
-    for line in failures(failed):
+    wrong = failures(rows)
+    for line in wrong:
         sys.stderr.write(f"error: {one_line(line)}\n")
     if isinstance(trouble, KeyboardInterrupt):
         raise trouble
     if trouble is not None:
         sys.stderr.write(f"error: {one_line(str(trouble))}; the same command goes on\n")
-    if failed or trouble:
+    if wrong or trouble:
         raise typer.Exit(FAILED)

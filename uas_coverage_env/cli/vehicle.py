@@ -1,12 +1,14 @@
 """`uas-coverage vehicle`: the vehicles that are shipped, a check of one's own, and a new one."""
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from uas_coverage_env.cli.options import ReplaceFileOption, check_file, declared
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError, parse
@@ -22,19 +24,7 @@ from uas_coverage_env.vehicle import (
 _PROPELLER = re.compile(r"(\d+(?:\.\d+)?)(?:\s*[xX]\s*(\d+(?:\.\d+)?))?")
 _USUAL_PITCH = 0.45  # of the diameter
 
-app = typer.Typer(
-    invoke_without_command=True, help="List the shipped vehicles, check one, or make one."
-)
 
-
-@app.callback()
-def vehicle(context: typer.Context) -> None:
-    """List the shipped vehicles; `check FILE` validates one, `new` makes one."""
-    if context.invoked_subcommand is None:
-        list_vehicles()
-
-
-@app.command("list")
 def list_vehicles() -> None:
     """List the shipped vehicles."""
     table = Table(
@@ -55,7 +45,6 @@ def list_vehicles() -> None:
     console().print(table)
 
 
-@app.command()
 def check(
     file: Annotated[
         str, typer.Argument(metavar="FILE", help="Vehicle file, or the name of a shipped one.")
@@ -69,73 +58,50 @@ def check(
         out.print(line, markup=False)
 
 
-@app.command()
-def new(
-    mass_kg: Annotated[float, typer.Option("--mass-kg", help="Ready to fly, battery included.")],
-    motors: Annotated[int, typer.Option(help="How many, equally spaced.")],
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What is asked of `vehicle new`; named as in `DataSheet` but for the propeller."""
+
+    mass_kg: Annotated[float, typer.Option(help="Ready to fly, battery included.")]
+    motors: Annotated[int, typer.Option(help="How many, equally spaced.")]
     propeller_in: Annotated[
         str,
-        typer.Option(
-            "--propeller-in", metavar="DIAMETERxPITCH", help="Inches, as 10x4.5; or the diameter."
-        ),
-    ],
-    cells: Annotated[int, typer.Option(help="LiPo cells in series.")],
-    capacity_Ah: Annotated[float, typer.Option("--capacity-Ah", help="Of the whole battery.")],
-    hover_minutes: Annotated[
-        float, typer.Option("--hover-minutes", help="From full until --charge-left is left.")
-    ],
-    top_speed_mps: Annotated[float, typer.Option("--top-speed-mps", help="In still air.")],
-    out: Annotated[Path, typer.Option(help="Vehicle file to write.")],
+        typer.Option(metavar="DIAMETERxPITCH", help="Inches, as 10x4.5; or the diameter."),
+    ]
+    cells: Annotated[int, typer.Option(help="LiPo cells in series.")]
+    capacity_Ah: Annotated[float, typer.Option("--capacity-Ah", help="Of the whole battery.")]
+    hover_minutes: Annotated[float, typer.Option(help="From full until --charge-left is left.")]
+    top_speed_mps: Annotated[float, typer.Option(help="In still air.")]
+    out: Annotated[Path, typer.Option(help="Vehicle file to write.")]
     charge_left: Annotated[
-        float, typer.Option("--charge-left", help="Share of the charge left after that hover.")
-    ] = 0.0,
-    arm_m: Annotated[float | None, typer.Option("--arm-m", help="Centre to rotor axis.")] = None,
-    tilt_deg: Annotated[float | None, typer.Option("--tilt-deg", help="Largest tilt.")] = None,
-    thrust_to_weight: Annotated[
-        float | None, typer.Option("--thrust-to-weight", help="At full throttle.")
-    ] = None,
+        float, typer.Option(help="Share of the charge left after that hover.")
+    ] = 0.0
+    arm_m: Annotated[float | None, typer.Option(help="Centre to rotor axis.")] = None
+    tilt_deg: Annotated[float | None, typer.Option(help="Largest tilt.")] = None
+    thrust_to_weight: Annotated[float | None, typer.Option(help="At full throttle.")] = None
     auxiliary_W: Annotated[
         float | None, typer.Option("--auxiliary-W", help="Avionics and payload.")
-    ] = None,
-    resistance_mohm: Annotated[
-        float | None, typer.Option("--resistance-mohm", help="Of the battery.")
-    ] = None,
-    climb_mps: Annotated[float | None, typer.Option("--climb-mps", help="Fastest climb.")] = None,
-    descent_mps: Annotated[
-        float | None, typer.Option("--descent-mps", help="Fastest descent.")
-    ] = None,
-    name: Annotated[str | None, typer.Option(help="Of the vehicle; default: the file's.")] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the file where it exists.")
-    ] = False,
-) -> None:
+    ] = None
+    resistance_mohm: Annotated[float | None, typer.Option(help="Of the battery.")] = None
+    climb_mps: Annotated[float | None, typer.Option(help="Fastest climb.")] = None
+    descent_mps: Annotated[float | None, typer.Option(help="Fastest descent.")] = None
+    name: Annotated[str | None, typer.Option(help="Of the vehicle; default: the file's.")] = None
+    overwrite: ReplaceFileOption = False
+
+
+@declared
+def new(asked: Asked) -> None:
     """Make a vehicle file from data-sheet figures and print the assumptions."""
-    if out.suffix != ".toml":
-        raise InputError(f"--out {out}: should end in .toml")
-    if out.exists() and not overwrite:
-        raise InputError(f"{out}: exists; give another --out or add --overwrite")
-    diameter_in, pitch_in = _propeller(propeller_in)
-    known: dict[str, Any] = {
-        "name": name or out.stem,
-        "mass_kg": mass_kg,
-        "motors": motors,
+    check_file(asked.out, overwrite=asked.overwrite)
+    diameter_in, pitch_in = _propeller(asked.propeller_in)
+    known = {name: value for name, value in vars(asked).items() if name in DataSheet.model_fields}
+    known |= {
+        "name": asked.name or asked.out.stem,
         "diameter_in": diameter_in,
         "pitch_in": pitch_in,
-        "cells": cells,
-        "capacity_Ah": capacity_Ah,
-        "hover_minutes": hover_minutes,
-        "top_speed_mps": top_speed_mps,
-        "charge_left": charge_left,
-        "arm_m": arm_m,
-        "tilt_deg": tilt_deg,
-        "thrust_to_weight": thrust_to_weight,
-        "auxiliary_W": auxiliary_W,
-        "resistance_mohm": resistance_mohm,
-        "climb_mps": climb_mps,
-        "descent_mps": descent_mps,
     }
     made = make_vehicle(parse(known, DataSheet, "vehicle new"))
-    write_atomically(out, made.file_text().encode())
+    write_atomically(asked.out, made.file_text().encode())
     screen = console()
     for origin in ("given", "computed", "assumed"):
         screen.print(origin, style="bold")
@@ -149,11 +115,11 @@ def new(
         screen.print(line, markup=False)
     exact, linear = made.hover_minutes
     screen.print(
-        f"asked for  {hover_minutes:g} min of hover down to {charge_left:.0%} charge: "
+        f"asked for  {asked.hover_minutes:g} min of hover down to {asked.charge_left:.0%} charge: "
         f"{exact:.1f} nonlinear, {linear:.1f} lpv",
         markup=False,
     )
-    screen.print(f"vehicle in {out}", markup=False)
+    screen.print(f"vehicle in {asked.out}", markup=False)
 
 
 def _propeller(text: str) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""`uas-coverage warm-up`: compile before the first flight."""
+"""`uas-coverage planner warm-up`: compile before the first flight."""
 
 import time
 from typing import Annotated
@@ -10,8 +10,8 @@ from uas_coverage_env.cli.output import console
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.draw import picture
-from uas_coverage_env.env.parallel import CoverageParallelEnv
-from uas_coverage_env.env.vector import CoverageVectorEnv
+from uas_coverage_env.env.api.parallel import CoverageParallelEnv
+from uas_coverage_env.env.api.vector import CoverageVectorEnv
 from uas_coverage_env.flight import Planner, load_planner, rollout
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario, load_scenario
@@ -27,7 +27,7 @@ def warm_up(
     planner: Annotated[
         list[str] | None,
         typer.Option(
-            help="Compile for this planner, see `planners`; may be repeated. Default: "
+            help="Compile for this planner, see `planner list`; may be repeated. Default: "
             f"{', '.join(_PLANNERS)}, and the environments.",
             show_default=False,
         ),
@@ -62,7 +62,8 @@ def warm_up(
     what = ", ".join([*names, *(["environments"] if learning else [])])
     console().print(f"{done}: {what}", markup=False)
     if not planner:
-        console().print("other planners: `uas-coverage warm-up --planner NAME`", markup=False)
+        others = "other planners: `uas-coverage planner warm-up --planner NAME`"
+        console().print(others, markup=False)
 
 
 def _compile_planner(planner: Planner, scenario: Scenario) -> None:

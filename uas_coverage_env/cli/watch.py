@@ -5,7 +5,8 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import Picture, Window
+from uas_coverage_env.draw import Picture
+from uas_coverage_env.draw.window import Window
 from uas_coverage_env.flight import Planner, Progress
 from uas_coverage_env.scenario import Scenario
 

@@ -149,19 +149,19 @@ class Memory(Generic[T]):
         return self.declaration(**arrays)
 
     def zeros(self, sizes: Mapping[str, int], *, lanes: int | None = None) -> T:
-        """New arrays of zeros.
+        """New arrays: of zeros, or of the smallest value where the declaration says values.
 
         Args:
             sizes: Of every name.
             lanes: Length of an axis in front of all; None: no such axis.
         """
         front = () if lanes is None else (lanes,)
-        return self.made_of(
-            {
-                field.name: np.zeros((*front, *field.shape(sizes)), dtype=field.dtype)
-                for field in self.fields
-            }
-        )
+        arrays = {}
+        for field in self.fields:
+            array = arrays[field.name] = np.zeros((*front, *field.shape(sizes)), dtype=field.dtype)
+            if "" in field.values and field.values[""].low:
+                array[...] = field.values[""].low
+        return self.made_of(arrays)
 
     def sizes_of(self, arrays: T, known: Mapping[str, int] | None = None) -> dict[str, int]:
         """The named sizes of arrays; this is also the check that they are what was declared.

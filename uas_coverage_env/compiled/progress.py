@@ -55,12 +55,15 @@ class Compilations(event.Listener):
     Attributes:
         listener: Told once the process has spent more than PATIENCE_S.
         n_compiled: Kernels compiled so far, each of its parts counted.
+        spent_s: Time spent on that [s].
+        processor_s: Processor time spent on that [s].
     """
 
     def __init__(self) -> None:
         self.listener = _say_it_once()
         self.n_compiled = 0
         self.spent_s = self._since_s = 0.0
+        self.processor_s = self._busy_since_s = 0.0
         self._depth = self._n_made = 0
 
     def on_start(self, event: Any) -> None:
@@ -70,6 +73,7 @@ class Compilations(event.Listener):
             self._depth += 1
             if self._depth == 1:
                 self._since_s, self._n_made = time.perf_counter(), 0
+                self._busy_since_s = time.process_time()
             self._tell()
 
     def on_end(self, event: Any) -> None:
@@ -80,6 +84,7 @@ class Compilations(event.Listener):
             self._tell()
             if self._depth == 0:
                 self.spent_s += time.perf_counter() - self._since_s
+                self.processor_s += time.process_time() - self._busy_since_s
 
     def _tell(self) -> None:
         if self.spent_s + time.perf_counter() - self._since_s > PATIENCE_S:

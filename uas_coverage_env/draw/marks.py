@@ -6,9 +6,16 @@ from typing import TYPE_CHECKING
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.colours import Colour
 from uas_coverage_env.draw.frame import Frame
+from uas_coverage_env.scenario import Scenario
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
+
+
+def heavy_waypoints(scenario: Scenario) -> list[bool]:
+    """Of each waypoint whether it weighs more than the lightest: on all maps, two rings."""
+    weights = [point.weight for point in scenario.waypoints]
+    return [weight > min(weights) for weight in weights]
 
 
 def waypoint(
@@ -22,7 +29,7 @@ def waypoint(
         x: Centre on the canvas.
         y: Centre on the canvas.
         radius: On the canvas.
-        heavy: Weighs more than the lightest waypoint of its scenario.
+        heavy: As `heavy_waypoints` says.
         open_: Still to be covered.
     """
     edge = colours.INK if open_ else colours.COVERED_EDGE

@@ -13,9 +13,10 @@ from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.draw.labels import Box, overlap, short_name
 from uas_coverage_env.draw.terrain import terrain
 from uas_coverage_env.draw.text import fitted, width_of, write
+from uas_coverage_env.entities.state import FLYING, LANDED, STATUS_NAMES
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, Z
-from uas_coverage_env.world import FLYING, LANDED, STATUS_NAMES, SwarmState
+from uas_coverage_env.vehicle.layout import DOD, Z
+from uas_coverage_env.world import SwarmState
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -75,8 +76,7 @@ class Picture:
         self._frame = frame = Frame.around(scenario.fence.vertices_m, int(size_px))
         positions_m = np.array([point.position_m for point in scenario.waypoints]).reshape(-1, 3)
         self._waypoints = frame.pixels(positions_m).tolist()
-        weights = [point.weight for point in scenario.waypoints]
-        self._heavy = [weight > min(weights) for weight in weights]
+        self._heavy = marks.heavy_waypoints(scenario)
         self._radii = [point.radius_m * frame.scale for point in scenario.waypoints]
         self._labels = [short_name(uas.name) for uas in scenario.uas]
         self._canvas = Canvas(frame.side)
@@ -276,7 +276,7 @@ class Picture:
 
 
 def _colour(i: int) -> colours.Colour:
-    return colours.UAS[i % len(colours.UAS)]
+    return colours.of_uas(i)
 
 
 def _summed_up(swarm: SwarmState) -> str:

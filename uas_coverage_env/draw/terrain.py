@@ -10,6 +10,7 @@ from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.draw.labels import free_place
 from uas_coverage_env.draw.text import fitted, width_of, write
 from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
 
     image = Image.new("RGB", (frame.side, frame.side), colours.PAPER)
     draw = ImageDraw.Draw(image)
-    fence = _outline(scenario.fence.vertices_m)
+    fence = outline_of(scenario.fence.vertices_m)
     draw.polygon(_flat(frame.pixels(fence)), fill=colours.GROUND)
     _grid(draw, frame, fence)
     for decoration in scenario.decorations:
@@ -67,8 +68,8 @@ def height_places(scenario: Scenario, frame: Frame) -> list[tuple[float, float] 
     size = _HEIGHT * frame.letter
     return [
         free_place(
-            frame.pixels(_outline(hull.vertices_m)),
-            np.array([width_of(_height(hull), size), size]) + frame.unit,
+            frame.pixels(outline_of(hull.vertices_m)),
+            np.array([width_of(height_words(hull), size), size]) + frame.unit,
             discs,
         )
         for hull in scenario.hulls
@@ -119,7 +120,7 @@ def _shadows(image: "Image", frame: Frame, hulls: tuple[ConvexPolytope, ...]) ->
         ground_z = hull.vertices_m[:, 2].max()
         height_m = ground_z - hull.vertices_m[:, 2]
         shadow = hull.vertices_m[:, :2] + height_m[:, None] * _SHADOW
-        outline = _outline(np.vstack([shadow, hull.vertices_m[:, :2]]))
+        outline = outline_of(np.vstack([shadow, hull.vertices_m[:, :2]]))
         draw.polygon(_flat(frame.pixels(outline)), fill=60)
     image.paste(colours.INK, mask=mask)
 
@@ -143,17 +144,18 @@ def _obstacle(
     for face in np.flatnonzero(hull.normals[:, 2] < -1e-6):
         corners = hull.vertices_m[np.abs(distances[:, face]) < 1e-6]
         light = 0.62 + 0.5 * max(0.0, float(hull.normals[face] @ _LIGHT))
-        draw.polygon(_flat(frame.pixels(_outline(corners))), fill=colours.shaded(tint, light))
-    outline = _outline(hull.vertices_m)
+        draw.polygon(_flat(frame.pixels(outline_of(corners))), fill=colours.shaded(tint, light))
+    outline = outline_of(hull.vertices_m)
     edge = _flat(frame.pixels(np.vstack([outline, outline[:1]])))
     width = round((1 + min(1.0, height_m / _TALL_M)) * frame.unit)
     draw.line(edge, fill=colours.shaded(tint, 0.55), width=width, joint="curve")
     ink = colours.WHITE if sum(tint) < _DARK else colours.shaded(tint, 0.35)
     if place is not None:
-        write(image, place, _height(hull), _HEIGHT * frame.letter, ink, align=0.5)
+        write(image, place, height_words(hull), _HEIGHT * frame.letter, ink, align=0.5)
 
 
-def _height(hull: ConvexPolytope) -> str:
+def height_words(hull: ConvexPolytope) -> str:
+    """How high an obstacle is, as it stands on maps."""
     return f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
 
 
@@ -176,35 +178,6 @@ def _margins(image: "Image", draw: "ImageDraw", frame: Frame, name: str) -> None
         draw.line((x, y, x + 4 * unit, y), fill=colours.FAINT, width=round(unit))
         write(image, (x + 7 * unit, y), f"{altitude_m:.0f}", 9 * frame.letter, colours.FAINT)
     write(image, (x - 4 * unit, top - 12 * unit), "alt [m]", 9 * frame.letter, colours.FAINT)
-
-
-def _outline(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners of the convex hull of points seen from above, in order.
-
-    Args:
-        points_m: (P, 2 or 3) [m].
-
-    Returns:
-        (C, 2) [m].
-    """
-    points = sorted({(float(north), float(east)) for north, east in points_m[:, :2]})
-    if len(points) < 3:
-        return np.array(points)
-    return np.array([*_chain(points), *_chain(points[::-1])])
-
-
-def _chain(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """One side of the hull of sorted points, without its last corner (monotone chain)."""
-    chain: list[tuple[float, float]] = []
-    for point in points:
-        while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
-            chain.pop()
-        chain.append(point)
-    return chain[:-1]
-
-
-def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _flat(pixels: NDArray[np.float64]) -> list[float]:

@@ -5,6 +5,10 @@ give names of their own: numba compares a member of an enumeration with no float
 """
 
 from enum import IntEnum
+from typing import Literal
+
+DynamicsName = Literal["lpv", "nonlinear"]
+"""The paper's linear model, or 6-DOF with exact power."""
 
 
 class UasStatus(IntEnum):

@@ -3,7 +3,7 @@
 from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.entities.codes import ContactKind
 from uas_coverage_env.entities.commands import COMMAND_DTYPE
-from uas_coverage_env.vehicle import N_INPUTS
+from uas_coverage_env.vehicle.layout import N_INPUTS
 
 NONE, OBSTACLE, MOVING_OBSTACLE, UAS, FENCE, BATTERY, FAULT, LIMITS = map(int, ContactKind)
 

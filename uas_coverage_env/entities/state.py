@@ -10,7 +10,8 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.compiled.memory import Memory, Values, record_dtype
 from uas_coverage_env.compiled.views import replaced
 from uas_coverage_env.entities.codes import UasStatus
-from uas_coverage_env.vehicle import N_STATES, PSI, VEHICLE_DTYPE
+from uas_coverage_env.vehicle.layout import N_STATES, PSI
+from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
 
 ABSENT, FLYING, LANDED, LOST, SWAPPING = map(int, UasStatus)
 

@@ -18,7 +18,7 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.compiled.random import normal
 from uas_coverage_env.features.feature import Disturbance
 from uas_coverage_env.features.steady_wind import mean_wind_mps, wind_velocity_mps
-from uas_coverage_env.vehicle import VX, Z
+from uas_coverage_env.vehicle.layout import VX, Z
 
 FOOT_M = 0.3048
 LOWEST_FT, HIGHEST_FT = 10.0, 1000.0

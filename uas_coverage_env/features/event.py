@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.entities.state import EVERY
-from uas_coverage_env.features.feature import Feature
+from uas_coverage_env.features.feature import MissionFeature
 from uas_coverage_env.files.names import Name
 from uas_coverage_env.files.strict_toml import StrictModel
 
@@ -34,7 +34,7 @@ class EventTable(StrictModel):
             seed from the exponential distribution. It happens once at most.
     """
 
-    feature: ClassVar[Feature | None] = None
+    feature: ClassVar[MissionFeature | None] = None
     """What it does in a step; one for all events of the kind. Its kernels find their events by
     `concerns`."""
     on_all: ClassVar[bool] = False

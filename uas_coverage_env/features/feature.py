@@ -65,7 +65,7 @@ FEATURE_DTYPE = record_dtype(
 
 
 @dataclass(frozen=True, eq=False)
-class Feature:
+class MissionFeature:
     """Something that few missions have.
 
     A kernel is compiled with `uas_coverage_env.compiled.kernels.rare_kernel`, takes what `Point`
@@ -105,7 +105,7 @@ _memory_of = record_view(MEMORY_DTYPE)
 
 
 @dataclass(frozen=True)
-class Disturbance(Feature):
+class Disturbance(MissionFeature):
     """A feature that acts on each UAS by itself, and that no planner is told of.
 
     Its kernel is `act(arena, state, outcome, i, parameters, memory, random)`, compiled with
@@ -181,18 +181,18 @@ def _begin_common(arena, state, f, seed):
         memory[i].random[0] = counted(seed, 0)
 
 
-def checked_features(features: Any) -> tuple[Feature, ...]:
+def checked_features(features: Any) -> tuple[MissionFeature, ...]:
     """The features of a mission.
 
     Raises:
         ValueError: They are no features, or two have one name.
     """
-    return checked_blocks("disturbances", "disturbances", features, Feature, least=0)
+    return checked_blocks("disturbances", "disturbances", features, MissionFeature, least=0)
 
 
 def in_slots(
-    missions: Sequence[Sequence[Feature]],
-) -> tuple[tuple[Feature, ...], list[tuple[Feature | None, ...]]]:
+    missions: Sequence[Sequence[MissionFeature]],
+) -> tuple[tuple[MissionFeature, ...], list[tuple[MissionFeature | None, ...]]]:
     """The features of many missions side by side, so that one table of kernels is for all.
 
     Args:
@@ -205,7 +205,7 @@ def in_slots(
     Raises:
         ValueError: Two of one name have different kernels.
     """
-    of_name: dict[str, Feature] = {}
+    of_name: dict[str, MissionFeature] = {}
     for features in missions:
         for feature in features:
             first = of_name.setdefault(feature.name, feature)
@@ -218,7 +218,9 @@ def in_slots(
     return tuple(of_name.values()), slots
 
 
-def fitted_to(kinds: Sequence[Feature], own: Sequence[Feature]) -> tuple[Feature | None, ...]:
+def fitted_to(
+    kinds: Sequence[MissionFeature], own: Sequence[MissionFeature]
+) -> tuple[MissionFeature | None, ...]:
     """The features of one more mission, in the slots of `in_slots`.
 
     Args:
@@ -237,7 +239,7 @@ def fitted_to(kinds: Sequence[Feature], own: Sequence[Feature]) -> tuple[Feature
 
 
 def feature_tables(
-    slots: Sequence[Feature | None], n_uas: int
+    slots: Sequence[MissionFeature | None], n_uas: int
 ) -> tuple[NDArray[np.void], NDArray[np.uint64]]:
     """Features for kernels.
 
@@ -266,14 +268,14 @@ def feature_tables(
     return rows, np.concatenate([np.zeros(0, np.uint64), *words])
 
 
-def memory_words(features: Sequence[Feature | None], n_uas: int) -> int:
+def memory_words(features: Sequence[MissionFeature | None], n_uas: int) -> int:
     """How many words the memory of features takes for a fleet."""
     kept = [feature.memory for feature in features if feature is not None]
     return sum(_words(n_uas * dtype.itemsize) for dtype in kept if dtype is not None)
 
 
 def memory_of(
-    features: Sequence[Feature | None], n_uas: int, words: NDArray[np.uint64]
+    features: Sequence[MissionFeature | None], n_uas: int, words: NDArray[np.uint64]
 ) -> dict[str, NDArray[np.void]]:
     """What features have kept in the memory of a mission, by their names: views of it.
 

@@ -6,7 +6,7 @@ from pydantic import model_validator
 
 from uas_coverage_env.compiled.kernels import rare_kernel
 from uas_coverage_env.features.event import OfUas, concerns
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 
 
 @rare_kernel
@@ -33,7 +33,7 @@ class LateStart(OfUas):
         kind: `"late_start"`.
     """
 
-    feature: ClassVar = Feature("late_start", {Point.BEGIN: _begin, Point.COMMAND: _ground})
+    feature: ClassVar = MissionFeature("late_start", {Point.BEGIN: _begin, Point.COMMAND: _ground})
 
     kind: Literal["late_start"]
 

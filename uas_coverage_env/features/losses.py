@@ -7,8 +7,8 @@ from pydantic import Field
 from uas_coverage_env.compiled.kernels import rare_kernel
 from uas_coverage_env.entities.outcome import FAULT, NONE
 from uas_coverage_env.features.event import OfUas, concerns, happens
-from uas_coverage_env.features.feature import Feature, Point
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.features.feature import MissionFeature, Point
+from uas_coverage_env.vehicle.layout import DOD
 
 
 @rare_kernel
@@ -35,7 +35,7 @@ class UasLost(OfUas):
         kind: `"uas_lost"`.
     """
 
-    feature: ClassVar = Feature("uas_lost", {Point.MOVED: _lose_uas})
+    feature: ClassVar = MissionFeature("uas_lost", {Point.MOVED: _lose_uas})
 
     kind: Literal["uas_lost"]
 
@@ -48,7 +48,7 @@ class ChargeLost(OfUas):
         share: How much of its capacity [-].
     """
 
-    feature: ClassVar = Feature("charge_lost", {Point.MOVED: _lose_charge})
+    feature: ClassVar = MissionFeature("charge_lost", {Point.MOVED: _lose_charge})
 
     kind: Literal["charge_lost"]
     share: Annotated[float, Field(gt=0.0, le=1.0)]

@@ -7,9 +7,10 @@ from pydantic import Field
 from uas_coverage_env.compiled.kernels import rare_kernel, stack_array
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.features.event import OfUas, concerns
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.features.true_vehicles import perturb
-from uas_coverage_env.vehicle import LIFT, N_PERTURBATIONS, POWER
+from uas_coverage_env.vehicle.layout import LIFT
+from uas_coverage_env.vehicle.true_vehicle import N_PERTURBATIONS, POWER
 
 
 @rare_kernel
@@ -42,7 +43,7 @@ class MotorDegraded(OfUas):
         power_factor: How many times as much power it draws for the same thrust [-].
     """
 
-    feature: ClassVar = Feature("motor_degraded", {Point.ACT: _degrade}, perturbs=True)
+    feature: ClassVar = MissionFeature("motor_degraded", {Point.ACT: _degrade}, perturbs=True)
 
     kind: Literal["motor_degraded"]
     thrust_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0

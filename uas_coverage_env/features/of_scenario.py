@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from uas_coverage_env.features.feature import Feature, checked_features
+from uas_coverage_env.features.feature import MissionFeature, checked_features
 
 
-def disturbances_of(scenario: Any) -> tuple[Feature, ...]:
+def disturbances_of(scenario: Any) -> tuple[MissionFeature, ...]:
     """What the tables of a scenario say that acts on how UAS fly; empty where nothing does.
 
     Raises:
@@ -15,7 +15,9 @@ def disturbances_of(scenario: Any) -> tuple[Feature, ...]:
     return checked_features([each for each in _of_tables(scenario) if each.disturbs])
 
 
-def features_of(scenario: Any, disturbances: Sequence[Feature] | None = None) -> list[Feature]:
+def features_of(
+    scenario: Any, disturbances: Sequence[MissionFeature] | None = None
+) -> list[MissionFeature]:
     """What a mission has of what few missions have, but for packs.
 
     Args:
@@ -31,5 +33,5 @@ def features_of(scenario: Any, disturbances: Sequence[Feature] | None = None) ->
     return list(dict.fromkeys([*checked_features(acting), *others, *of_events]))
 
 
-def _of_tables(scenario: Any) -> list[Feature]:
+def _of_tables(scenario: Any) -> list[MissionFeature]:
     return [each for table in scenario.feature_tables for each in table.features()]

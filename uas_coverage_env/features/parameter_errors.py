@@ -11,10 +11,11 @@ from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.compiled.random import counted, uniform
 from uas_coverage_env.compiled.views import record_view
 from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.features.table import FeatureTable
 from uas_coverage_env.features.true_vehicles import perturb
-from uas_coverage_env.vehicle import CAPACITY, LIFT, MASS, N_PERTURBATIONS, THRUST
+from uas_coverage_env.vehicle.layout import LIFT
+from uas_coverage_env.vehicle.true_vehicle import CAPACITY, MASS, N_PERTURBATIONS, THRUST
 
 Share = Annotated[float, Field(ge=0.0, le=0.5)]
 
@@ -40,7 +41,7 @@ class Uncertainty(FeatureTable):
     capacity_lost: Share = 0.0
     resistance_gained: Annotated[float, Field(ge=0.0, le=5.0)] = 0.0
 
-    def features(self) -> Iterable[Feature]:
+    def features(self) -> Iterable[MissionFeature]:
         """The true vehicles; none where all bounds are zero."""
         return () if self == Uncertainty() else (uncertainty(self),)
 
@@ -86,11 +87,11 @@ def _hover(arena, state, outcome, f):
             outcome[i].u[LIFT] += memory[i].more_lift * arena.vehicles[i].weight_N
 
 
-def uncertainty(bounds: Uncertainty) -> Feature:
+def uncertainty(bounds: Uncertainty) -> MissionFeature:
     """The true vehicles of a scenario."""
     each = (
         *(bounds.mass, bounds.thrust, bounds.drag, bounds.power),
         *(bounds.capacity_lost, bounds.resistance_gained),
     )
     kernels = {Point.BEGIN: _draw, Point.ACT: _hover}
-    return Feature("uncertainty", kernels, np.array(each), MEMORY_DTYPE, perturbs=True)
+    return MissionFeature("uncertainty", kernels, np.array(each), MEMORY_DTYPE, perturbs=True)

@@ -8,7 +8,7 @@ from uas_coverage_env.compiled.views import record_view
 from uas_coverage_env.entities.commands import CLIMB, GO_TO, HOME, WRENCH
 from uas_coverage_env.entities.state import NEVER
 from uas_coverage_env.features.event import EventTable, OfUas, Seconds, concerns, lasts
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 
 Then = Literal["go_on", "hover", "return"]
 """What a UAS flies that hears no commands; kernels know it by its place here."""
@@ -67,7 +67,7 @@ def _stay_silent(state, i, since, for_steps):
     state.uas[i].responds_from_step = max(state.uas[i].responds_from_step, until)
 
 
-_DEAF = Feature(
+_DEAF = MissionFeature(
     "commands_lost", {Point.COMMAND: _hear, Point.JUDGED: _note_silence}, memory=HEARD_DTYPE
 )
 

@@ -12,9 +12,9 @@ from uas_coverage_env.compiled.random import counted, normal, uniform
 from uas_coverage_env.compiled.views import record_view
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.features.event import OfUas, Seconds, concerns, lasts
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.features.table import FeatureTable
-from uas_coverage_env.vehicle import DOD, N_STATES, U_TH, VX, VY, X, Y
+from uas_coverage_env.vehicle.layout import DOD, N_STATES, U_TH, VX, VY, X, Y
 
 LONGEST_DELAY = 7
 """Steps by which what is sensed may lag behind."""
@@ -103,7 +103,7 @@ def _sense(arena, state, outcome, f):
             state.observed[i, k] = own.delayed[late, k]
 
 
-SENSING = Feature(
+SENSING = MissionFeature(
     "sensing",
     {Point.BEGIN: _begin, Point.SENSED: _sense},
     memory=MEMORY_DTYPE,
@@ -137,7 +137,7 @@ class Sensing(FeatureTable):
     charge_bias: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
     delay_steps: Annotated[int, Field(ge=0, le=LONGEST_DELAY)] = 0
 
-    def features(self) -> Iterable[Feature]:
+    def features(self) -> Iterable[MissionFeature]:
         """Sensors of all UAS."""
         return (SENSING,)
 

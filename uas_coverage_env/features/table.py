@@ -12,7 +12,7 @@ from functools import cache
 from importlib import import_module
 from typing import ClassVar, TypeVar
 
-from uas_coverage_env.features.feature import Feature
+from uas_coverage_env.features.feature import MissionFeature
 from uas_coverage_env.files.strict_toml import StrictModel
 
 T = TypeVar("T")
@@ -24,7 +24,7 @@ class FeatureTable(StrictModel):
     table: ClassVar[str] = ""
     """Its key, of a table that this package has."""
 
-    def features(self) -> Iterable[Feature]:
+    def features(self) -> Iterable[MissionFeature]:
         """What a mission with this table has.
 
         Raises:
@@ -40,7 +40,7 @@ class DisturbanceTable(FeatureTable):
     name that scenario files use.
     """
 
-    def disturbance(self) -> Feature:
+    def disturbance(self) -> MissionFeature:
         """The feature that the table describes, for example a `Disturbance`.
 
         Raises:
@@ -48,7 +48,7 @@ class DisturbanceTable(FeatureTable):
         """
         raise NotImplementedError(f"{type(self).__name__} has no method disturbance()")
 
-    def features(self) -> Iterable[Feature]:
+    def features(self) -> Iterable[MissionFeature]:
         """This one."""
         return (self.disturbance(),)
 

@@ -1,7 +1,7 @@
 """What disturbances do to the vehicle that flies: its parameters become others than believed."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.vehicle import N_PERTURBATIONS, write_true_vehicle
+from uas_coverage_env.vehicle.true_vehicle import N_PERTURBATIONS, write_true_vehicle
 
 
 @inlined_kernel

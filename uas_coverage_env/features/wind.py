@@ -12,7 +12,7 @@ from pydantic import (
 )
 
 from uas_coverage_env.features.dryden import turbulence
-from uas_coverage_env.features.feature import Feature
+from uas_coverage_env.features.feature import MissionFeature
 from uas_coverage_env.features.gusts import discrete_gusts, random_gusts
 from uas_coverage_env.features.steady_wind import mean_wind
 from uas_coverage_env.features.table import FeatureTable
@@ -88,7 +88,7 @@ class Wind(FeatureTable):
     random_gusts: RandomGusts | None = None
     power: Literal["fitted", "rotor"] = "fitted"
 
-    def features(self) -> Iterator[Feature]:
+    def features(self) -> Iterator[MissionFeature]:
         """The mean comes first: turbulence is flown through with the airspeed in it."""
         unsteady = bool((self.turbulence and self.mean_mps) or self.gusts or self.random_gusts)
         if self.mean_mps or self.up_mps or (unsteady and self.power == "rotor"):

@@ -7,6 +7,16 @@ class InputError(ValueError):
     """A mistake in what a person gave us: one line that names file, field, value and fix."""
 
 
+def check_within(option: str, value: float, least: float, most: float) -> None:
+    """Refuse a number out of bounds.
+
+    Raises:
+        InputError: It is, or it is none.
+    """
+    if not least <= value <= most:
+        raise InputError(f"{option} {value:g}: should be between {least:g} and {most:g}")
+
+
 class PlannerError(ValueError):
     """A planner raised an exception, or gave commands that cannot be flown.
 

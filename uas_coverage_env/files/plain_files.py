@@ -40,14 +40,19 @@ def read_bytes(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
 
 
 def read_text(path: Path, most_bytes: int = MOST_BYTES) -> str:
-    """The text of a plain file in UTF-8, see `read_bytes`.
+    """The text of a plain file, see `read_bytes` and `decoded`."""
+    return decoded(read_bytes(path, most_bytes))
+
+
+def decoded(content: bytes) -> str:
+    """The text of a file in UTF-8.
 
     Windows' editors and spreadsheets begin it with a byte order mark, which is no part of it.
 
     Raises:
         UnicodeDecodeError: It is not UTF-8.
     """
-    return read_bytes(path, most_bytes).decode("utf-8-sig").replace("\r\n", "\n")
+    return content.decode("utf-8-sig").replace("\r\n", "\n")
 
 
 def write_beside(path: Path, content: bytes) -> Path:

@@ -13,10 +13,11 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
-from uas_coverage_env.env.observer import Observer
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.loop import Progress, rollout
@@ -25,7 +26,7 @@ from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.runner.store import STORE, rows_in
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import SwarmState
 
 UNKNOWN_CHOICE = -1
 """The choice where the waypoint that came next was not among those to choose from."""
@@ -101,7 +102,7 @@ class Demonstrations:
 
     @classmethod
     def load(cls, directory: str | Path) -> Self:
-        """Read what `uas-coverage demonstrate` has written; nothing is unpickled.
+        """Read what `uas-coverage planner demonstrate` has written; nothing is unpickled.
 
         Raises:
             InputError: There are none, or a file is damaged; names it.
@@ -140,7 +141,7 @@ class Demonstrator:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._observer = Observer(MissionBrief.of(scenario))
+        self._observer = MissionInterface(MissionBrief.of(scenario))
         self._seen: list[_Seen] = []
 
     def __call__(self, progress: Progress) -> None:

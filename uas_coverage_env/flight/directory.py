@@ -13,7 +13,7 @@ from typing import Any
 
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight.metrics import summary
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.flight.of_log import STATES
 from uas_coverage_env.flight.record import MODES, FlightRecord
 from uas_coverage_env.scenario import Scenario

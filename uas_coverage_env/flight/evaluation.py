@@ -1,78 +1,50 @@
 """How well a planner or a policy flies: returns and measures of missions, drawn from seeds."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from uas_coverage_env.env.settings import MissionSettings
-from uas_coverage_env.flight.flight import Flight
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.flight.figure import NOTHING, ByName, Figure
+from uas_coverage_env.flight.figures import computed, figures, repeated, rows_part
+from uas_coverage_env.flight.flight import Flight, unless_stopped
 from uas_coverage_env.flight.loop import rollout
-from uas_coverage_env.flight.metrics import (
-    accomplished,
-    coverage,
-    energy_Wh,
-    episode_return,
-    home,
-    reward_sums,
-)
 from uas_coverage_env.flight.planner import Planner
 from uas_coverage_env.flight.policy import as_planner
-from uas_coverage_env.flight.record import LOST
 from uas_coverage_env.flight.registry import load_planner
-from uas_coverage_env.scenario import MissionSource, ScenarioLike
+from uas_coverage_env.scenario import MissionSource
+from uas_coverage_env.scenario.source import ScenarioLike
 
 
 @dataclass(frozen=True)
-class Episode:
-    """One mission, in numbers.
+class Episode(ByName):
+    """One mission, in numbers: `figures` (docs/flight_directory.md) are attributes of it, too.
 
     Attributes:
         seed: Of the mission, as in `reset(seed=...)`.
         scenario: Name of the scenario that it drew.
-        episode_return: Sum of the rewards of all UAS, not discounted.
         reward_terms: Term -> its part of the return.
-        coverage: Fraction of the waypoints, 0..1.
-        energy_Wh: Drawn by all UAS [Wh].
-        steps: Until the last UAS was home, lost, or time was up.
-        n_uas: UAS of the mission.
-        home: UAS that have landed.
-        lost: UAS that were lost.
-        breaches: Samples closer than the safe distances, or below the least height.
-        accomplished: Everything covered, all home, no violation.
+        figures: By name, as rows have them: `coverage`, `energy_Wh`, `steps`, `lost`, ...; not
+            those of what it took to compute, so that a mission flown again is equal.
+        failed_figures: Which could not be computed -> why.
     """
 
     seed: int
     scenario: str
-    episode_return: float
     reward_terms: Mapping[str, float]
-    coverage: float
-    energy_Wh: float
-    steps: int
-    n_uas: int
-    home: int
-    lost: int
-    breaches: int
-    accomplished: bool
+    figures: Mapping[str, bool | int | float | None]
+    failed_figures: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, flight: Flight, seed: int) -> "Episode":
         """What a flight is in numbers."""
+        values, failed = computed(flight)
+        terms = values["reward_terms"] or {}
+        row = rows_part(values)
         return cls(
-            seed=seed,
-            scenario=flight.scenario.name,
-            episode_return=episode_return(flight) or 0.0,
-            reward_terms=reward_sums(flight),
-            coverage=coverage(flight),
-            energy_Wh=float(energy_Wh(flight).sum()),
-            steps=flight.steps,
-            n_uas=len(flight.names),
-            home=int(home(flight).sum()),
-            lost=int((flight.mode[-1] == LOST).sum()),
-            breaches=flight.breaches,
-            accomplished=accomplished(flight),
+            seed, flight.scenario.name, terms, {name: row[name] for name in repeated()}, failed
         )
 
 
@@ -87,27 +59,48 @@ class Evaluation:
     episodes: tuple[Episode, ...]
 
     def mean(self, measure: str) -> float:
-        """The mean of a measure of `Episode`, or of a term of the reward."""
-        if measure in Episode.__dataclass_fields__:
-            return float(np.mean([getattr(episode, measure) for episode in self.episodes]))
-        return float(np.mean([episode.reward_terms[measure] for episode in self.episodes]))
+        """The mean of a figure over the missions that have it, or of a term of the reward.
+
+        Raises:
+            ValueError: No mission has it.
+        """
+        if measure in self.episodes[0].figures:
+            found = [episode.figures[measure] for episode in self.episodes]
+        else:
+            found = [episode.reward_terms.get(measure) for episode in self.episodes]
+        values = [value for value in found if value is not None]
+        if not values:
+            known = [*self.episodes[0].figures, *self.episodes[0].reward_terms]
+            raise ValueError(f"no mission has {measure!r}; there are {', '.join(known)}")
+        return float(np.mean(values))
 
     def __str__(self) -> str:
-        """Means over the missions, a line for each measure."""
-        lost = sum(episode.lost for episode in self.episodes)
-        flown = sum(episode.n_uas for episode in self.episodes)
-        terms = {name: f"{self.mean(name):.2f}" for name in self.episodes[0].reward_terms}
-        lines = {
-            "missions": f"{len(self.episodes)}",
-            "return": f"{self.mean('episode_return'):.2f}",
-            **{f"  {name}": value for name, value in terms.items()},
-            "covered": f"{100.0 * self.mean('coverage'):.1f} %",
-            "energy": f"{self.mean('energy_Wh'):.1f} Wh",
-            "steps": f"{self.mean('steps'):.0f}",
-            "lost": f"{lost} of {flown} UAS",
-            "accomplished": f"{100.0 * self.mean('accomplished'):.0f} %",
-        }
-        return "\n".join(f"{name:16}{value}" for name, value in lines.items())
+        """Means over the missions, a line for each figure; of what is counted, the sum."""
+        terms = {f"  {name}": f"{self.mean(name):.2f}" for name in self.episodes[0].reward_terms}
+        lines = {"missions": f"{len(self.episodes)}"}
+        for name, figure in figures().items():
+            if figure.shown and name in self.episodes[0].figures:
+                lines[figure.label] = self._summed_up(figure)
+            if name == "episode_return":
+                lines |= terms
+        wide = max(map(len, lines)) + 2
+        failed = dict.fromkeys(
+            why for each in self.episodes for why in each.failed_figures.values()
+        )
+        return "\n".join([*(f"{name:{wide}}{text}" for name, text in lines.items()), *failed])
+
+    def _summed_up(self, figure: Figure) -> str:
+        values = [episode.figures[figure.name] for episode in self.episodes]
+        there = [value for value in values if value is not None]
+        if not there:
+            return NOTHING
+        if figure.kind is bool:
+            return f"{sum(there)} of {len(there)}"
+        if figure.over == "total":
+            return str(sum(there))
+        if figure.kind is int:
+            return f"{np.mean(there):.1f}"
+        return figure.printed(float(np.mean(there)))
 
 
 def evaluate(

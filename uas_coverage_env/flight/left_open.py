@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.flight.record import LANDED, LOST, FlightRecord, LeftOpen, Why
 from uas_coverage_env.flight.scene_history import SceneHistory
-from uas_coverage_env.mission import Access, Errand, Errands, MissionBrief
-from uas_coverage_env.scenario import out_of_reach
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.access import Access
+from uas_coverage_env.mission.errands import Errand, Errands
+from uas_coverage_env.scenario.checks import out_of_reach
+from uas_coverage_env.vehicle.layout import DOD
 
 FloatArray = NDArray[np.float64]
 

@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import interpreted
-from uas_coverage_env.entities.outcome import FAULT, NONE
-from uas_coverage_env.env.meter import RewardMeter
+from uas_coverage_env.entities.commands import command_mode
+from uas_coverage_env.entities.outcome import CONTACT_NAMES, FAULT, NONE
+from uas_coverage_env.entities.state import FLYING, SWAPPING
+from uas_coverage_env.entities.state import LOST as IS_LOST
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.features.event import OfUas
 from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.flight.record import (
@@ -29,10 +32,18 @@ from uas_coverage_env.flight.record import (
 )
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle import LIMIT_NAMES, N_LIMITS, open_circuit_V, write_limited
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import CONTACT_NAMES, FLYING, SWAPPING, Command, command_mode
-from uas_coverage_env.world import LOST as IS_LOST
+from uas_coverage_env.vehicle.discharge import open_circuit_V
+from uas_coverage_env.vehicle.limits import LIMIT_NAMES, N_LIMITS, write_limited
+from uas_coverage_env.world import Command
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What a decision took: time, and processor time of all threads, where it is known [s]."""
+
+    wall_s: float = 0.0
+    processor_s: float | None = 0.0
 
 
 @dataclass(frozen=True)
@@ -61,7 +72,9 @@ class FlightLog:
         meter: Of the reward; None where no commands are known that it could be paid for.
     """
 
-    def __init__(self, world: World, scenario: Scenario, meter: RewardMeter | None = None) -> None:
+    def __init__(
+        self, world: World, scenario: Scenario, meter: MissionInterface | None = None
+    ) -> None:
         self._world = world
         self._scenario = scenario
         self._meter = meter
@@ -85,21 +98,21 @@ class FlightLog:
         self,
         commands: Mapping[str, Command],
         packed: NDArray[np.void] | None,
-        duration_s: float,
+        took: Taken,
         decision: Decision | None,
         outcome: NDArray[np.void],
     ) -> None:
         """Keep the step just flown: the commands, how they were found, and what came of them."""
         paid = None
         if self._meter is not None and packed is not None:
-            paid = self._meter.terms(packed, outcome)
+            paid = self._meter.reward_terms(packed, outcome)
         names = self._world.names
         modes = [
             _mode(commands.get(name), returning)
             for name, returning in zip(names, outcome["returning"], strict=True)
         ]
         filtered = int(outcome["filtered"].sum())
-        record = _decision_record(duration_s, decision, filtered)
+        record = _decision_record(took, decision, filtered)
         plan = _plan_rows(decision, self.steps, names)
         self._covered += int(outcome["newly_covered"].sum())
         step = _Step(outcome, modes, record, plan, paid, self._sample())
@@ -144,7 +157,7 @@ class FlightLog:
             "events": self._events(),
             "swaps": tuple(self._swaps()),
             "reward_terms": self._reward_terms(),
-            "reward_names": () if self._meter is None else self._meter.names,
+            "reward_names": () if self._meter is None else self._meter.settings.term_names,
             "open_waypoints": self._world.visits_to_come
             if self._scenario.events or self._scenario.asks_again
             else None,
@@ -156,7 +169,7 @@ class FlightLog:
         """(T - 1, U, R)."""
         if self._meter is None:
             return None
-        shape = (len(self._steps), len(self._world.names), len(self._meter.names))
+        shape = (len(self._steps), len(self._world.names), len(self._meter.settings.term_names))
         return np.array([step.paid for step in self._steps]).reshape(shape)
 
     def _moving_path_m(self, n_samples: int) -> NDArray[np.float64]:
@@ -268,12 +281,11 @@ def _plan_rows(decision: Decision | None, step: int, names: tuple[str, ...]) -> 
     return np.concatenate(parts)
 
 
-def _decision_record(duration_s: float, decision: Decision | None, filtered: int) -> DecisionRecord:
-    if decision is None:
-        return DecisionRecord(duration_s, filtered=filtered)
-    gap = decision.mip_gap
-    if gap is not None:
-        # an infinite gap says that there is no bound
-        gap = float(gap) if math.isfinite(gap) else None
-    reason = None if decision.reason is None else str(decision.reason)
-    return DecisionRecord(duration_s, decision.fallback, gap, filtered, reason)
+def _decision_record(took: Taken, decision: Decision | None, filtered: int) -> DecisionRecord:
+    gap = reason = None
+    if decision is not None:
+        if decision.mip_gap is not None and math.isfinite(decision.mip_gap):
+            gap = float(decision.mip_gap)  # an infinite gap says that there is no bound
+        reason = None if decision.reason is None else str(decision.reason)
+    fallback = decision is not None and decision.fallback
+    return DecisionRecord(took.wall_s, fallback, gap, filtered, reason, took.processor_s)

@@ -13,26 +13,31 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
-from uas_coverage_env.env.meter import RewardMeter
+from uas_coverage_env.entities.codes import DynamicsName
+from uas_coverage_env.entities.commands import pack
+from uas_coverage_env.entities.state import FLYING, LANDED
+from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
-from uas_coverage_env.features import Feature
+from uas_coverage_env.features import MissionFeature
 from uas_coverage_env.features.of_scenario import features_of
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.flight import Flight
-from uas_coverage_env.flight.interruption import interruptions_noted
 from uas_coverage_env.flight.left_open import left_open
-from uas_coverage_env.flight.log import FlightLog
+from uas_coverage_env.flight.log import FlightLog, Taken
 from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
-from uas_coverage_env.mission import MissionBrief, Relaunch
+from uas_coverage_env.interruptions import signals_noted
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.relaunch import Relaunch
 from uas_coverage_env.plugins.installed import version_of
 from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
-from uas_coverage_env.simulation import Dynamics, World
-from uas_coverage_env.vehicle import Z
-from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Velocity, pack
+from uas_coverage_env.simulation import World
+from uas_coverage_env.vehicle.layout import Z
+from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 from uas_coverage_env.world.packs import swaps_alone
 
 _RECORDED_PACKAGES = (
@@ -66,11 +71,11 @@ def rollout(
     planner: Planner | str,
     seed: int = 0,
     *,
-    dynamics: Dynamics = "lpv",
+    dynamics: DynamicsName = "lpv",
     return_mode: bool | None = None,
     safety_filter: bool | None = None,
     max_steps: int | None = None,
-    disturbances: Sequence[Feature] | None = None,
+    disturbances: Sequence[MissionFeature] | None = None,
     reward: Sequence[RewardTerm] = REWARD,
     reward_weights: Mapping[str, float] | None = None,
     on_step: Callable[[Progress], object] | None = None,
@@ -137,7 +142,10 @@ def rollout(
             judges_wrenches=getattr(planner, "is_learner", False),
             seed=seed,
         )
-        meter = RewardMeter(world, reward, reward_weights) if reward or reward_weights else None
+        meter = None
+        if reward or reward_weights:
+            paid = MissionSettings(reward=tuple(reward), reward_weights=reward_weights)
+            meter = MissionInterface(world, paid)
         _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
@@ -167,7 +175,7 @@ def rollout(
 
     ended = "stopped"
     # the flight up to there is valid
-    with contextlib.suppress(KeyboardInterrupt), interruptions_noted() as interrupted:
+    with contextlib.suppress(KeyboardInterrupt), signals_noted() as interrupted:
 
         def stops() -> bool:
             return interrupted() or (should_stop is not None and should_stop())
@@ -188,7 +196,7 @@ def _with_reasons(flight: Flight, planner: Planner) -> Flight:
     return dataclasses.replace(flight, left_open=left_open(flight, said))
 
 
-def _is_uncertain(scenario: Scenario, disturbances: Sequence[Feature] | None) -> bool:
+def _is_uncertain(scenario: Scenario, disturbances: Sequence[MissionFeature] | None) -> bool:
     """Whether anything may push back."""
     if disturbances is not None:
         return bool(features_of(scenario, disturbances))
@@ -196,7 +204,7 @@ def _is_uncertain(scenario: Scenario, disturbances: Sequence[Feature] | None) ->
 
 
 def _make_ready(
-    world: World, meter: RewardMeter | None, planner: Planner, brief: MissionBrief, seed: int
+    world: World, meter: MissionInterface | None, planner: Planner, brief: MissionBrief, seed: int
 ) -> None:
     """Compile what world and planner begin with, then put both at the start."""
     state = world.swarm_state()
@@ -206,7 +214,7 @@ def _make_ready(
     packed = pack(stay, state.names, state.active, len(state.uncovered))
     outcome = _stepped(world, packed)
     if meter is not None:
-        meter.terms(packed, outcome)
+        meter.reward_terms(packed, outcome)
     world.reset()
     warm_up = getattr(planner, "warm_up", None)
     try:
@@ -240,11 +248,11 @@ def _fly(
             return "steps"
         if should_stop():
             return "stopped"
-        commands, packed, decision = _decide(planner, swarm)
+        commands, packed, took = _decide(planner, swarm)
         outcome = _stepped(world, packed)
         with _blamed(planner, swarm):
             found = getattr(planner, "last_decision", None) if swarm.active else None
-        log.add(commands, packed, decision, found, outcome)
+        log.add(commands, packed, took, found, outcome)
         before, swarm = swarm, world.swarm_state()
         changed = world.revisions != revisions
         if changed:
@@ -263,7 +271,7 @@ def _fly(
         if changed:
             with _blamed(planner, swarm):
                 planner.reset(MissionBrief.of(world.known), seed)
-        tell(swarm, decision)
+        tell(swarm, took.wall_s)
     return "complete"
 
 
@@ -272,22 +280,27 @@ def _worked_s() -> float:
     return time.perf_counter() - COMPILATIONS.spent_s
 
 
+def _busy_s() -> float:
+    """The same of processor time, of all threads [s]: a solver may have several."""
+    return time.process_time() - COMPILATIONS.processor_s
+
+
 def _relaunch(world: World) -> Relaunch | None:
     return Relaunch(MissionBrief.of(world.known)) if world.known.relaunch else None
 
 
 def _decide(
     planner: Planner, swarm: SwarmState
-) -> tuple[Mapping[str, Command], NDArray[np.void], float]:
+) -> tuple[Mapping[str, Command], NDArray[np.void], Taken]:
     """One decision, checked and timed; none is asked for while all swap packs."""
     if not swarm.active:
-        return {}, pack({}, swarm.names, (), len(swarm.uncovered)), 0.0
+        return {}, pack({}, swarm.names, (), len(swarm.uncovered)), Taken()
     with _blamed(planner, swarm):
-        started_s = _worked_s()
+        started_s, busy_s = _worked_s(), _busy_s()
         commands = planner.act(swarm)
-        duration_s = _worked_s() - started_s
+        took = Taken(_worked_s() - started_s, max(_busy_s() - busy_s, 0.0))
     try:
-        return commands, pack(commands, swarm.names, swarm.active, len(swarm.uncovered)), duration_s
+        return commands, pack(commands, swarm.names, swarm.active, len(swarm.uncovered)), took
     except ValueError as error:
         reason = f"planner {name_of(planner)!r} {_when(swarm)}: {error}"
         raise PlannerError(reason) from error

@@ -1,28 +1,24 @@
-"""Measures of one flight, each a pure function of its record, and the summary made of them."""
+"""Measures of one flight, each a pure function of its record; `figures` says where they go."""
 
 from collections import Counter
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight.of_log import OfLog
-from uas_coverage_env.flight.record import (
-    LANDED,
-    LIMIT,
-    EventRecord,
-    FlightRecord,
-    LeftOpen,
-    Violation,
-)
+from uas_coverage_env.flight.record import LANDED, LOST, FlightRecord
 from uas_coverage_env.flight.scene_history import covered_since
-from uas_coverage_env.flight.seen import seen_shares
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import landing, take_off
-from uas_coverage_env.vehicle import DOD, U_TH
+from uas_coverage_env.vehicle.layout import DOD, U_TH
 from uas_coverage_env.vehicle.vertical_flight import VerticalFlight
 
-_J_PER_WH = 3600.0
+_S_PER_H = 3600.0
+_NAMED = 8
+"""UAS whose names are told; of more, the number."""
+_MOVED_M = 1.0
+"""What flies moves farther."""
 
 
 def coverage(flight: FlightRecord) -> float:
@@ -31,8 +27,11 @@ def coverage(flight: FlightRecord) -> float:
     Of those that events have dropped before they were covered none counts; of those that events
     have added, all that were added in time. One that is to be covered again counts each time.
     """
-    left = open_waypoints(flight)
-    covered = int(flight.covered[-1])
+    return covered_share(int(flight.covered[-1]), open_waypoints(flight))
+
+
+def covered_share(covered: int, left: int) -> float:
+    """Fraction of the waypoints that are covered; 1 where there is none."""
     return float(covered / (covered + left)) if covered + left else 1.0
 
 
@@ -54,8 +53,48 @@ def covered_at(flight: FlightRecord) -> NDArray[np.int64]:
 
 def energy_Wh(flight: FlightRecord) -> NDArray[np.float64]:
     """(U,) [Wh] sum over samples of voltage times current times dt."""
+    each_Wh = flight.voltage_V * flight.current_A * (flight.scenario.dt_s / _S_PER_H)
+    # one after the other, as the environments add it up: equal to the last digit
+    sums_Wh: NDArray[np.float64] = np.add.accumulate(each_Wh, axis=0)
+    return sums_Wh[-1]
+
+
+def total_energy_Wh(flight: FlightRecord) -> float:
+    """Of all UAS [Wh]."""
+    return float(energy_Wh(flight).sum())
+
+
+def available_Wh(scenario: Scenario) -> float:
+    """What all batteries may give: charge above what must be left, at the mean voltage [Wh]."""
+    total_Wh = 0.0
+    for uas, vehicle in zip(scenario.uas, scenario.vehicles, strict=True):
+        battery = vehicle.battery
+        usable = uas.soc_0 - (1.0 - uas.dod_max)
+        total_Wh += usable * battery.capacity_Ah * float(np.mean(battery.ocv_V))
+    return total_Wh
+
+
+def energy_share(flight: FlightRecord) -> float | None:
+    """Energy drawn over what all batteries may give; None where they may give none."""
+    return share_of_available(total_energy_Wh(flight), flight.scenario)
+
+
+def share_of_available(energy_Wh: float, scenario: Scenario) -> float | None:
+    """Energy over what all batteries may give; None where they may give none."""
+    available = available_Wh(scenario)
+    return energy_Wh / available if available > 0.0 else None
+
+
+def min_soc(flight: FlightRecord) -> float:
+    """The least charge of any battery, 0..1."""
+    return float(flight.soc.min())
+
+
+def energy_until_Wh(flight: FlightRecord) -> NDArray[np.float64]:
+    """(T, U) [Wh] the same over the samples before each."""
     power_W = flight.voltage_V * flight.current_A
-    return power_W.sum(axis=0) * flight.scenario.dt_s / _J_PER_WH
+    until_W = np.concatenate([np.zeros_like(power_W[:1]), np.cumsum(power_W[:-1], axis=0)])
+    return until_W * flight.scenario.dt_s / _S_PER_H
 
 
 def packs_used(flight: FlightRecord) -> dict[str, int]:
@@ -82,6 +121,39 @@ def home(flight: FlightRecord) -> NDArray[np.bool_]:
     return flight.mode[-1] == LANDED
 
 
+def all_home(flight: FlightRecord) -> bool:
+    """Whether every UAS has landed."""
+    return bool(home(flight).all())
+
+
+def not_home(flight: FlightRecord) -> list[str] | None:
+    """The names of those that have not landed; None where all have."""
+    out = [name for name, landed in zip(flight.names, home(flight), strict=True) if not landed]
+    return out or None
+
+
+def named(names: Sequence[str]) -> str:
+    """The first few names, and how many more there are."""
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"{', '.join(names[:_NAMED])}{more}"
+
+
+def n_home(flight: FlightRecord) -> int:
+    """UAS that have landed."""
+    return int(home(flight).sum())
+
+
+def n_lost(flight: FlightRecord) -> int:
+    """UAS that were lost."""
+    return int((flight.mode[-1] == LOST).sum())
+
+
+def flew(flight: FlightRecord) -> int:
+    """UAS that have left their starts by more than 1 m."""
+    moved_m = np.abs(flight.x[:, :, :3] - flight.x[0, :, :3]).max(axis=(0, 2))
+    return int((moved_m > _MOVED_M).sum())
+
+
 def accomplished(flight: FlightRecord) -> bool:
     """Whether the mission succeeded: everything covered, every UAS home, no violation.
 
@@ -94,13 +166,24 @@ def accomplished(flight: FlightRecord) -> bool:
     return bool(open_waypoints(flight) == 0 and all_home and not flight.violations)
 
 
-def decision_time_s(flight: FlightRecord) -> dict[str, float | None]:
-    """Percentiles of the planner's time per decision [s]; None where there was no decision."""
+def percentiles(flight: FlightRecord, of_decision: str) -> dict[str, float | None]:
+    """Percentiles of a time of the planner's decisions [s]; None where there is none.
+
+    Args:
+        flight: The flight.
+        of_decision: `duration_s` or `processor_s`.
+    """
     names = ("p50", "p95", "p99", "max")
-    durations_s = [decision.duration_s for decision in flight.decisions]
-    if not durations_s:
+    times_s = [getattr(decision, of_decision) for decision in flight.decisions]
+    if not times_s or None in times_s:
         return dict.fromkeys(names)
-    return dict(zip(names, np.percentile(durations_s, (50, 95, 99, 100)).tolist(), strict=True))
+    return dict(zip(names, np.percentile(times_s, (50, 95, 99, 100)).tolist(), strict=True))
+
+
+def processor_time_s(flight: FlightRecord) -> dict[str, float | None] | None:
+    """Percentiles of the processor time per decision [s]; None where it was not kept."""
+    found = percentiles(flight, "processor_s")
+    return None if None in found.values() else found
 
 
 def mip_gap_p50(flight: FlightRecord) -> float | None:
@@ -115,14 +198,26 @@ def filtered_share(flight: FlightRecord) -> float:
     return sum(decision.filtered for decision in flight.decisions) / max(commands, 1)
 
 
-def ground_phases(flight: FlightRecord) -> list[dict[str, Any]]:
-    """Take-off and landing of each UAS, which lie outside of the samples.
+def height_breaches(flight: FlightRecord) -> int | None:
+    """Samples below the least height; None where there is no such rule."""
+    return flight.height_breaches if flight.scenario.min_height_m else None
+
+
+def n_fallbacks(flight: FlightRecord) -> int:
+    """Decisions flown on a fallback."""
+    return sum(decision.fallback for decision in flight.decisions)
+
+
+def ground_phases(flight: FlightRecord) -> list[dict[str, Any]] | None:
+    """Take-off and landing of each UAS, which lie outside of the samples; None: there are none.
 
     Returns:
         One entry per UAS: seconds and Wh of both, and the charge on the ground afterwards. Landing
         and charge are None of a UAS that has not come home. Where it has swapped packs, seconds
         and Wh are sums over all its flights.
     """
+    if not flight.scenario.from_ground:
+        return None
     entries = []
     for i, name in enumerate(flight.names):
         up = take_off(flight.scenario, i)
@@ -159,75 +254,6 @@ def fallback_reasons(flight: FlightRecord) -> dict[str, int]:
     return dict(reasons.most_common())
 
 
-def summary(flight: FlightRecord) -> dict[str, Any]:
-    """The fields of `summary.json`, in their order."""
-    return {
-        "coverage": coverage(flight),
-        # without cameras the file is as it was before there were any
-        **({"seen_ground": shares} if (shares := seen_shares(flight)) else {}),
-        "steps": flight.steps,
-        "energy_Wh": float(energy_Wh(flight).sum()),
-        **({"ground_phases": ground_phases(flight)} if flight.scenario.from_ground else {}),
-        # where no UAS swaps packs on its own, the file is as it was before that could be
-        **({"packs": packs_used(flight), "swaps": _swaps(flight)} if flight.swaps else {}),
-        # a record from before rewards were kept stays as it was
-        **({"return": episode_return(flight)} if flight.reward_terms is not None else {}),
-        **({"reward_terms": reward_sums(flight)} if flight.reward_terms is not None else {}),
-        # of a log: what was not measured
-        **(_of_log(flight.of_log) if flight.of_log is not None else {}),
-        "all_home": bool(home(flight).all()),
-        "min_separation_m": flight.min_separation_m,
-        "min_obstacle_clearance_m": flight.min_obstacle_clearance_m,
-        "violations": [_entry(violation) for violation in flight.violations],
-        # without events the file is as it was before there were any
-        **({"events": [_happened(event) for event in flight.events]} if flight.events else {}),
-        # where nothing is left open the file is as it was before reasons were kept
-        **({"left_open": [_open(one) for one in flight.left_open]} if flight.left_open else {}),
-        "breaches": flight.breaches,
-        # without the rule the file is as it was before there was one
-        **({"height_breaches": flight.height_breaches} if flight.scenario.min_height_m else {}),
-        "wall_time_s": flight.wall_time_s,
-        "decision_time_s": decision_time_s(flight),
-        "fallbacks": sum(decision.fallback for decision in flight.decisions),
-        "mip_gap_p50": mip_gap_p50(flight),
-        "versions": dict(flight.versions),
-        "seed": flight.seed,
-        "planner": {"name": flight.planner, "options": dict(flight.planner_options)},
-    }
-
-
-def _of_log(of_log: OfLog) -> dict[str, Any]:
-    return {
-        "estimated": [asdict(one) for one in of_log.estimates],
-        "not_known": [asdict(one) for one in of_log.unknown],
-    }
-
-
-def _swaps(flight: FlightRecord) -> list[dict[str, Any]]:
-    return [
-        {"t_s": swap.time_s, "uas": swap.uas, "landed_s": swap.landed_s} for swap in flight.swaps
-    ]
-
-
-def _happened(event: EventRecord) -> dict[str, Any]:
-    return {"t_s": event.time_s, "kind": event.kind, "uas": event.uas}
-
-
-def _open(left: LeftOpen) -> dict[str, Any]:
-    return {"waypoint": left.waypoint, "why": str(left.why), "detail": left.detail}
-
-
-def _entry(violation: Violation) -> dict[str, Any]:
-    entry = {
-        "t_s": violation.time_s,
-        "uas": violation.uas,
-        "kind": violation.kind,
-        "with": violation.partner,
-    }
-    if violation.kind == LIMIT:
-        entry |= {
-            "value": violation.value,
-            "limit": violation.limit,
-            "samples": violation.samples,
-        }
-    return entry
+def reasons_left_open(entries: Sequence[Mapping[str, Any]]) -> str:
+    """Why waypoints were left open, and how many for each reason, of their entries in the file."""
+    return ", ".join(f"{n} {why}" for why, n in Counter(each["why"] for each in entries).items())

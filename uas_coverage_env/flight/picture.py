@@ -7,14 +7,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.draw import Picture, legend
+from uas_coverage_env.draw import Picture
+from uas_coverage_env.draw.signs import legend
+from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.entities.state import LANDED as HAS_LANDED
+from uas_coverage_env.entities.state import LOST as IS_LOST
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.flight.flight import Flight
 from uas_coverage_env.flight.record import LANDED, LOST
 from uas_coverage_env.flight.scene_history import SceneHistory
-from uas_coverage_env.world import FLYING, SwarmState
-from uas_coverage_env.world import LANDED as HAS_LANDED
-from uas_coverage_env.world import LOST as IS_LOST
+from uas_coverage_env.world import SwarmState
 
 _SIZE_PX = 900
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.cockpit import Cockpit
-from uas_coverage_env.env.interface import shown
+from uas_coverage_env.env.api.forms import shown
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
-from uas_coverage_env.env.settings import MissionSettings
+from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.flight.planner import Assistants
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.world import Command, SwarmState
@@ -64,11 +64,11 @@ class PolicyFunction:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile observation and action."""
-        cockpit = Cockpit(brief, self._settings)
+        interface = MissionInterface(brief, self._settings)
         swarm = first_sight(brief)
-        cockpit.observe(swarm)
-        space = cockpit.actions.space()
-        cockpit.commands({name: space.sample() for name in swarm.active})
+        interface.observe(swarm)
+        space = interface.actions.space()
+        interface.commands({name: space.sample() for name in swarm.active})
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission; what the policy draws is its own affair.
@@ -80,22 +80,22 @@ class PolicyFunction:
             raise ValueError(
                 f"it has {len(brief.uas)} UAS, and the policy is one for {self._swarm_of}"
             )
-        self._cockpit = Cockpit(brief, self._settings)
+        self._interface = MissionInterface(brief, self._settings)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Ask the policy."""
-        cockpit = self._cockpit
-        seen = cockpit.observe(swarm)
-        masks = cockpit.action_masks() if self._settings.mask_in_observation else None
+        interface = self._interface
+        seen = interface.observe(swarm)
+        masks = interface.action_masks() if self._settings.mask_in_observation else None
         active = {i: name for i, name in enumerate(swarm.names) if name in swarm.active}
         if self._swarm_of is not None:
             rows = self._joint_rows(self._swarm_of, seen, masks)
-            return cockpit.commands({name: rows[i] for i, name in active.items()})
+            return interface.commands({name: rows[i] for i, name in active.items()})
         told = {
             name: shown(self._settings, seen[i], None if masks is None else masks[i])
             for i, name in active.items()
         }
-        return cockpit.commands({name: self._policy(each) for name, each in told.items()})
+        return interface.commands({name: self._policy(each) for name, each in told.items()})
 
     def _joint_rows(
         self, n_uas: int, seen: NDArray[np.float32], masks: NDArray[np.int8] | None
@@ -107,4 +107,4 @@ class PolicyFunction:
             none = self._settings.kind.masks(np.full((lacking, K_WAYPOINTS), -1))
             masks = np.concatenate([masks, none.astype(np.int8)]).ravel()
         told = shown(self._settings, rows, masks, n_uas)
-        return self._cockpit.actions.joint_rows(self._policy(told), n_uas)
+        return self._interface.actions.joint_rows(self._policy(told), n_uas)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, JsonValue, model_validator
 
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.files.strict_toml import InputError, StrictModel
 from uas_coverage_env.flight.checked import (
     chosen,
@@ -44,8 +45,7 @@ from uas_coverage_env.flight.record import (
     Why,
 )
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
 
 Count = Annotated[int, Field(ge=0)]
 Seconds = Annotated[float, Field(ge=0.0)]
@@ -108,6 +108,7 @@ class _Decision(StrictModel):
     mip_gap: float | None = None
     filtered: Count = 0
     reason: str | None = None
+    processor_s: Seconds | None = None
 
 
 class _Event(StrictModel):
@@ -124,7 +125,7 @@ class _Swap(StrictModel):
 
 
 class _Run(StrictModel):
-    dynamics: Dynamics
+    dynamics: DynamicsName
     return_mode: bool
     safety_filter: bool
     disturbances: tuple[str, ...] = ()

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.codes import ContactKind
+from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.flight.of_log import OfLog
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import LIMITS, body_attitude
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import CONTACT_NAMES
+from uas_coverage_env.vehicle.attitude import body_attitude
+from uas_coverage_env.vehicle.limits import LIMITS
 
 MODES = ("covering", "transit", "return", "landed", "lost")
 COVERING, TRANSIT, RETURN, LANDED, LOST = range(len(MODES))
@@ -61,6 +62,13 @@ class Violation:
         value = max(values, key=lambda one: abs(one - (self.limit or 0.0)))
         return dataclasses.replace(self, value=value, samples=(self.samples or 0) + 1)
 
+    def entry(self) -> dict[str, Any]:
+        """As plain data of a file."""
+        entry = {"t_s": self.time_s, "uas": self.uas, "kind": self.kind, "with": self.partner}
+        if self.kind == LIMIT:
+            entry |= {"value": self.value, "limit": self.limit, "samples": self.samples}
+        return entry
+
     def __str__(self) -> str:
         """As a line for people."""
         if self.kind == LIMIT:
@@ -92,6 +100,10 @@ class EventRecord:
     uas: str | None
     event: int
 
+    def entry(self) -> dict[str, Any]:
+        """As plain data of a file."""
+        return {"t_s": self.time_s, "kind": self.kind, "uas": self.uas}
+
     def __str__(self) -> str:
         """As a line for people."""
         concerned = f" of {self.uas}" if self.uas else ""
@@ -111,6 +123,10 @@ class Swap:
     uas: str
     landed_s: float
     time_s: float
+
+    def entry(self) -> dict[str, Any]:
+        """As plain data of a file."""
+        return {"t_s": self.time_s, "uas": self.uas, "landed_s": self.landed_s}
 
 
 class Why(StrEnum):
@@ -165,6 +181,10 @@ class LeftOpen:
     why: Why
     detail: str
 
+    def entry(self) -> dict[str, Any]:
+        """As plain data of a file."""
+        return {"waypoint": self.waypoint, "why": str(self.why), "detail": self.detail}
+
     def __str__(self) -> str:
         """As a line for people."""
         return f"waypoints[{self.waypoint}]: {self.why}: {self.detail}"
@@ -175,7 +195,8 @@ class DecisionRecord:
     """One decision of the planner: how long it took, how it came about, what was left of it.
 
     `filtered` counts the UAS whose command the safety filter replaced; `reason` says why there was
-    a fallback, where the planner says it.
+    a fallback, where the planner says it; `processor_s` is the processor time [s] of all threads,
+    None in a flight from a log or of a version before.
     """
 
     duration_s: float
@@ -183,6 +204,7 @@ class DecisionRecord:
     mip_gap: float | None = None
     filtered: int = 0
     reason: str | None = None
+    processor_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.flight.record import LANDED, LOST, EventRecord, FlightRecord
 from uas_coverage_env.scenario import NoFlyZone, Scenario
 from uas_coverage_env.scenario.scene_events import WaypointDropped
-from uas_coverage_env.vehicle import VZ
+from uas_coverage_env.vehicle.layout import VZ
 from uas_coverage_env.world.coverage import covering_samples
 from uas_coverage_env.world.events import steps_until
 

@@ -108,8 +108,7 @@ def sorties_summary(flights: Sequence[Flight], *, stopped: bool = False) -> dict
 
 def _entry(flight: Flight) -> dict[str, Any]:
     time_s, spent_Wh = flight.steps * flight.scenario.dt_s, float(energy_Wh(flight).sum())
-    if flight.scenario.from_ground:
-        phases = ground_phases(flight)
+    if phases := ground_phases(flight):
         for phase in ("take_off", "landing"):
             time_s += max(float(entry[f"{phase}_s"] or 0.0) for entry in phases)
             spent_Wh += sum(float(entry[f"{phase}_Wh"] or 0.0) for entry in phases)

@@ -9,7 +9,8 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, PlannerError, Progress, rollout
 from uas_coverage_env.flight.demonstrations import Demonstrator, written
 from uas_coverage_env.flight.directory import flight_files
-from uas_coverage_env.flight.interruption import unless_stopped
+from uas_coverage_env.flight.flight import unless_stopped
+from uas_coverage_env.leaderboard.check import verdict_on
 from uas_coverage_env.leaderboard.row import Row
 from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.plugins.users_code import described
@@ -73,13 +74,14 @@ def flown(entry: Entry, on_step: Callable[[Progress], object] | None = None) -> 
     )
 
 
-def fly(entry: Entry, source_sha256: str, kept: Kept = "row") -> Flown:
+def fly(entry: Entry, source_sha256: str, kept: Kept = "row", *, check: bool = False) -> Flown:
     """Fly one flight, whatever becomes of it.
 
     Args:
         entry: What to fly.
         source_sha256: Hash of the source code that flies.
         kept: What is kept of it.
+        check: Whether the independent checker judges it; what it disagrees with is kept.
 
     Raises:
         KeyboardInterrupt: It was stopped by hand.
@@ -90,11 +92,13 @@ def fly(entry: Entry, source_sha256: str, kept: Kept = "row") -> Flown:
         flight = flown(entry, watch)
         if watch is not None:
             files = {f"{entry.scenario.name}.npz": written(watch.shown(flight))}
-        elif kept == "flight":
+        verdict = verdict_on(flight) if check else None
+        row = Row.of(entry, flight, source_sha256, verdict)
+        if kept == "flight" or row.disagrees:
             folder = kept_as(entry)
             files = {f"{folder}/{name}": text for name, text in flight_files(flight).items()}
     except (InputError, PlannerError) as error:
         return Flown(Row.failed(entry, str(error), source_sha256), {})
     except Exception as error:  # an error in one flight must not end the others
         return Flown(Row.failed(entry, described(error), source_sha256), {})
-    return Flown(Row.of(entry, flight, source_sha256), files)
+    return Flown(row, files)

@@ -1,16 +1,16 @@
 """Time against energy: one planner with different options, and which of them are worth flying."""
 
-import itertools
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import fmean, median
 from typing import TYPE_CHECKING
 
 from uas_coverage_env.draw import colours
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard.planner_specs import PlannerSpec, planner_specs_of
+from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.row import Row
-from uas_coverage_env.leaderboard.table import NOTHING, Cells
+from uas_coverage_env.leaderboard.scores import NOTHING
+from uas_coverage_env.leaderboard.table import Cells
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,111 +18,104 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Choice:
-    """One flight of a mission, as a point in the plane of time and energy.
+    """A planner with its options on one mission, as a point in the plane of time and energy.
 
     Attributes:
-        settings: The options that were varied, as text.
-        row: The flight.
+        settings: The options that were varied, as text; the planner before them, where several are.
+        flown: Flights, of as many seeds.
+        accomplished: How many of them accomplished the mission; the figures are means of these.
         time_s: Until the last UAS has landed.
-        n_flying: UAS that flew; None where it is not known.
+        energy_Wh: Of the swarm.
+        flew: UAS that flew.
         bound_Wh: The least energy in this time; None where there is no bound.
-        on_front: Whether no other flight is better in one of time and energy, and as good in the
-            other; of equal ones the first.
+        on_front: Whether no other one is better in one of time and energy, and as good in the
+            other; of equal ones the first. One that does not always accomplish the mission is not.
     """
 
     settings: str
-    row: Row
+    flown: int
+    accomplished: int
     time_s: float
-    n_flying: int | None
+    energy_Wh: float
+    flew: int
     bound_Wh: float | None
     on_front: bool
 
 
-def varied_specs(planner: str, vary: Iterable[str]) -> dict[str, PlannerSpec]:
-    """A planner with every combination of values, by label; the label names the values.
-
-    Args:
-        planner: Its name.
-        vary: KEY=VALUE,VALUE,... each.
-
-    Raises:
-        InputError: An unknown planner or option, a value that does not fit, no value, or a key
-            given twice.
-    """
-    values: dict[str, list[str]] = {}
-    for text in vary:
-        key, equals, listed = (part.strip() for part in text.partition("="))
-        found = [value.strip() for value in listed.split(",") if value.strip()]
-        if not (key and equals and found):
-            raise InputError(
-                f"--vary {text!r}: should be KEY=VALUE,VALUE,... as in weight_energy=0,0.6"
-            )
-        if key in values:
-            raise InputError(f"--vary {key} is given twice; give all of its values at once")
-        values[key] = list(dict.fromkeys(found))
-    specs: dict[str, PlannerSpec] = {}
-    for chosen in itertools.product(*values.values()):
-        settings = [f"{key}={value}" for key, value in zip(values, chosen, strict=True)]
-        label = "+".join(part.replace("=", "-") for part in settings) or "default"
-        options = [f"{label}:{setting}" for setting in settings]
-        specs |= planner_specs_of([f"{label}={planner}"], options)
-    return specs
+Fronts = Mapping[str, Sequence[Choice]]
+"""By mission."""
 
 
 def choices_of(
-    rows: Sequence[Row],
-    keys: Sequence[str],
-    dt_s: float,
-    flying: Mapping[str, int],
-    bounds: Mapping[tuple[str, int], float],
+    rows: Sequence[Row], keys: Sequence[str], dt_s: float, bounds: Bounds
 ) -> list[Choice]:
-    """The accomplished flights of one mission, quickest first.
+    """The planners that accomplished one mission, quickest first.
 
     Args:
-        rows: Flights; those that did not accomplish the mission are dropped.
+        rows: Its flights; those that did not accomplish it are dropped.
         keys: The options that were varied.
         dt_s: Of the scenario.
-        flying: Label -> UAS that flew.
         bounds: See `bounds_of`.
     """
-    done = [row for row in rows if row.accomplished and row.steps and row.energy_Wh]
-    done.sort(key=lambda row: (row.steps, row.energy_Wh, row.label))
-    found, least_Wh = [], float("inf")
-    for row in done:
-        steps, energy_Wh = row.steps or 0, row.energy_Wh or 0.0
-        options = json.loads(row.options)
-        settings = ", ".join(f"{key} {options[key]}" for key in keys)
-        found.append(
-            Choice(
-                settings,
-                row,
-                steps * dt_s,
-                flying.get(row.label),
-                bounds.get((row.scenario, steps)),
-                energy_Wh < least_Wh,
+    several = len({row.planner for row in rows}) > 1
+    found = []
+    for label in dict.fromkeys(row.label for row in rows):
+        mine = [row for row in rows if row.label == label]
+        done = [row for row in mine if row.accomplished and row.steps and row.energy_Wh]
+        if done:
+            least = [bounds.get((row.scenario, row.steps)) for row in done]
+            known = [bound for bound in least if bound is not None]
+            found.append(
+                (
+                    fmean(row.steps for row in done) * dt_s,
+                    fmean(row.energy_Wh for row in done),
+                    label,
+                    _settings(done[0], keys, several=several),
+                    (len(mine), len(done), round(median(row.flew for row in done))),
+                    fmean(known) if len(known) == len(done) else None,
+                )
             )
+    choices, least_Wh = [], float("inf")
+    for time_s, energy_Wh, _, settings, (flown, accomplished, flew), bound_Wh in sorted(
+        found, key=lambda one: one[:3]
+    ):
+        counts = flown == accomplished
+        best = counts and energy_Wh < least_Wh
+        choices.append(
+            Choice(settings, flown, accomplished, time_s, energy_Wh, flew, bound_Wh, best)
         )
-        least_Wh = min(least_Wh, energy_Wh)
-    return found
+        least_Wh = min(least_Wh, energy_Wh) if counts else least_Wh
+    return choices
+
+
+def _settings(row: Row, keys: Sequence[str], *, several: bool) -> str:
+    options = json.loads(row.options)
+    chosen = [f"{key} {options[key]}" for key in keys if key in options]
+    return ", ".join([*([row.planner] if several else []), *chosen])
 
 
 def front_cells(choices: Sequence[Choice]) -> Cells:
     """Headings and rows: all flights, quickest first."""
-    headings = ["options", "UAS flying", "time, s", "energy, Wh", "above the bound, %", "front"]
+    several = any(one.flown > 1 for one in choices)
+    headings = ["options", *(["accomplished"] if several else []), "UAS flying", "time, s"]
+    headings += ["energy, Wh", "above the bound, %", "front"]
     return headings, [
         [
             one.settings,
-            NOTHING if one.n_flying is None else str(one.n_flying),
+            *([f"{one.accomplished}/{one.flown}"] if several else []),
+            str(one.flew),
             f"{one.time_s:g}",
-            f"{one.row.energy_Wh:.2f}",
-            _above(one),
+            f"{one.energy_Wh:.2f}",
+            NOTHING
+            if one.bound_Wh is None
+            else f"{100.0 * (one.energy_Wh / one.bound_Wh - 1.0):.1f}",
             "yes" if one.on_front else "",
         ]
         for one in choices
     ]
 
 
-def front_figure(choices: Mapping[str, Sequence[Choice]]) -> "Figure":
+def front_figure(choices: Fronts) -> "Figure":
     """Energy over time, a panel for each mission: flights, their front, and the lower bound.
 
     Args:
@@ -145,12 +138,12 @@ def front_figure(choices: Mapping[str, Sequence[Choice]]) -> "Figure":
             axes.set_axis_off()
         for axes, (name, found) in zip(panels, choices.items(), strict=False):
             blue, faint = shade(colours.BLUE), shade(colours.SKY)
-            energy_Wh = [one.row.energy_Wh or 0.0 for one in found]
+            energy_Wh = [one.energy_Wh for one in found]
             axes.plot([one.time_s for one in found], energy_Wh, ".", color=faint, label="flights")
             best = [one for one in found if one.on_front]
             axes.plot(
                 [one.time_s for one in best],
-                [one.row.energy_Wh or 0.0 for one in best],
+                [one.energy_Wh for one in best],
                 "o-",
                 color=blue,
                 markersize=3.5,
@@ -158,10 +151,8 @@ def front_figure(choices: Mapping[str, Sequence[Choice]]) -> "Figure":
                 label="front",
             )
             for one in best:
-                if one.n_flying is not None:
-                    at = (one.time_s, one.row.energy_Wh or 0.0)
-                    offset = {"textcoords": "offset points", "xytext": (3, 4), "fontsize": 7}
-                    axes.annotate(str(one.n_flying), at, **offset)
+                offset = {"textcoords": "offset points", "xytext": (3, 4), "fontsize": 7}
+                axes.annotate(str(one.flew), (one.time_s, one.energy_Wh), **offset)
             bound = sorted({(one.time_s, one.bound_Wh) for one in found if one.bound_Wh})
             if bound:
                 style = {"drawstyle": "steps-pre", "color": "black", "label": "lower bound"}
@@ -174,9 +165,3 @@ def front_figure(choices: Mapping[str, Sequence[Choice]]) -> "Figure":
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         figure.suptitle("Each point is a flight; numbers: UAS that fly.", fontsize=8)
     return figure
-
-
-def _above(one: Choice) -> str:
-    if one.bound_Wh is None or one.row.energy_Wh is None:
-        return NOTHING
-    return f"{100.0 * (one.row.energy_Wh / one.bound_Wh - 1.0):.1f}"

@@ -1,6 +1,6 @@
 """The picture of a comparison: coverage and energy, a row per planner, a dot per flight."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from uas_coverage_env.draw import colours
@@ -58,13 +58,13 @@ def leaderboard_figure(scores: Sequence[Scores], rows: Sequence[Row], reference:
     return figure
 
 
-def picture(scores: Sequence[Scores], rows: Sequence[Row], reference: str) -> bytes | None:
-    """`leaderboard_figure` as a PNG; None where matplotlib (extra `view`) is not installed."""
+def drawn(figure: Callable[[], "Figure"]) -> bytes | None:
+    """A figure as a PNG; None where matplotlib (extra `view`) is not installed."""
     try:
         from uas_coverage_env.replay.figures import png_of
     except ImportError:
         return None
-    return png_of(leaderboard_figure(scores, rows, reference))
+    return png_of(figure())
 
 
 def _draw(axes: "Axes", place: int, values: Sequence[float], found: Estimate) -> None:

@@ -1,5 +1,6 @@
 """What is compared: planners and policies by name, each with all its options."""
 
+import itertools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Planner, load_planner
 from uas_coverage_env.flight.registry import options_of
 
+_NO_LABEL = re.compile(r"[^\w.+-]")
 _LABELLED = re.compile(r"([\w.+-]+)=(.+)", re.DOTALL)
 
 
@@ -68,15 +70,20 @@ class PlannerSpec:
         return planner
 
 
-def planner_specs_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, PlannerSpec]:
+def planner_specs_of(
+    texts: Iterable[str], options: Iterable[str], vary: Iterable[str] = ()
+) -> dict[str, PlannerSpec]:
     """The planners that the command line names, by label, in their order.
 
     Args:
         texts: Each one or several (comma between them) of PLANNER or LABEL=PLANNER.
         options: LABEL:KEY=VALUE each; the label of a planner without one is its name.
+        vary: KEY=VALUE,VALUE,... of all planners, or LABEL:KEY=... of one: it is flown with every
+            combination of the values, which its labels name.
 
     Raises:
-        InputError: No planner, an unknown one or an unknown option, a label given twice.
+        InputError: No planner, an unknown one or an unknown option, a label or key given twice, a
+            value that does not fit.
     """
     planners: dict[str, str] = {}
     for item in (part.strip() for text in texts for part in text.split(",")):
@@ -98,19 +105,58 @@ def planner_specs_of(texts: Iterable[str], options: Iterable[str]) -> dict[str, 
         if key in given[label]:
             raise InputError(f"--option {label}:{key} is given twice; give it once")
         given[label][key] = value
-    return {
-        label: PlannerSpec.named(label, planner, given[label])
-        for label, planner in planners.items()
-    }
+    varied = _varied(vary, list(planners))
+    specs: dict[str, PlannerSpec] = {}
+    for label, planner in planners.items():
+        for key in varied[label].keys() & given[label].keys():
+            raise InputError(f"--vary {key}: --option {label}:{key} gives it, too; leave one out")
+        for values in itertools.product(*varied[label].values()):
+            chosen = dict(zip(varied[label], values, strict=True))
+            parts = [label, *(f"{key}-{value}" for key, value in chosen.items())]
+            name = "+".join([label, *(_NO_LABEL.sub("-", part) for part in parts[1:])])
+            if name in specs:
+                raise InputError(f"--vary: {parts[1:]} and another choice are both called {name!r}")
+            specs[name] = PlannerSpec.named(name, planner, {**given[label], **chosen})
+    return specs
+
+
+def varied_keys(vary: Iterable[str]) -> list[str]:
+    """The names of the options that are varied."""
+    return list(dict.fromkeys(_setting(text)[1] for text in vary))
+
+
+def _varied(vary: Iterable[str], labels: Sequence[str]) -> dict[str, dict[str, list[str]]]:
+    """Label -> option -> its values."""
+    found: dict[str, dict[str, list[str]]] = {label: {} for label in labels}
+    for text in vary:
+        label, key, listed = _setting(text)
+        values = [value.strip() for value in listed.split(",") if value.strip()]
+        if not (key and values):
+            raise InputError(
+                f"--vary {text!r}: should be KEY=VALUE,VALUE,... as in weight_energy=0,0.6"
+            )
+        if label and label not in labels:
+            raise InputError(f"--vary {text!r}: no {label!r} in --planners {','.join(labels)}")
+        for each in [label] if label else labels:
+            if key in found[each]:
+                raise InputError(f"--vary {key} is given twice; give all of its values at once")
+            found[each][key] = list(dict.fromkeys(values))
+    return found
 
 
 def _option(text: str, labels: Sequence[str]) -> tuple[str, str, str]:
-    left, equals, value = (part.strip() for part in text.partition("="))
-    label, colon, key = (part.strip() for part in left.rpartition(":"))
-    if not (equals and colon and key):
+    label, key, value = _setting(text)
+    if not (label and key and "=" in text):
         raise InputError(
             f"--option {text!r}: should be PLANNER:KEY=VALUE, as in {labels[0]}:horizon=12"
         )
     if label not in labels:
         raise InputError(f"--option {text!r}: no {label!r} in --planners {','.join(labels)}")
+    return label, key, value
+
+
+def _setting(text: str) -> tuple[str, str, str]:
+    """LABEL, KEY and VALUE of LABEL:KEY=VALUE; empty where it is not there."""
+    left, _, value = (part.strip() for part in text.partition("="))
+    label, _, key = (part.strip() for part in left.rpartition(":"))
     return label, key, value

@@ -5,7 +5,7 @@ import dataclasses
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,22 +14,22 @@ from uas_coverage_env.files.output_dir import write_files
 from uas_coverage_env.files.plain_files import read_bytes
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.bounds import Bounds
+from uas_coverage_env.leaderboard.front import Fronts, front_cells, front_figure
 from uas_coverage_env.leaderboard.hardware import machine, versions
-from uas_coverage_env.leaderboard.picture import picture
+from uas_coverage_env.leaderboard.picture import drawn, leaderboard_figure
 from uas_coverage_env.leaderboard.row import FAILED, Row
 from uas_coverage_env.leaderboard.scores import Scores, scores_of
 from uas_coverage_env.leaderboard.table import (
-    effort_cells,
+    cells,
     markdown,
     notes,
-    outcome_cells,
-    reference_cells,
     scenarios_cells,
 )
 from uas_coverage_env.runner.store import STORE, columns_of, rows_in
 
 FLIGHTS, TABLE, SCORES = "flights.parquet", "table.md", "table.json"
 PICTURE = "coverage-energy.png"
+FRONT, FRONT_PICTURE = "front.md", "front.png"
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class Comparison:
         command: The command line that made it.
         jobs: How it was flown, for people.
         scores: Of each planner, best first.
+        fronts: Of each mission, where options were varied: time against energy.
     """
 
     rows: Sequence[Row]
@@ -51,6 +52,7 @@ class Comparison:
     command: str
     jobs: str
     scores: Sequence[Scores]
+    fronts: Fronts = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -61,9 +63,11 @@ class Comparison:
         command: str,
         jobs: str,
         bounds: Bounds = MappingProxyType({}),
+        fronts: Fronts = MappingProxyType({}),
     ) -> "Comparison":
         """Sum up rows, of which there is at least one."""
-        return cls(rows, planned, reference, command, jobs, scores_of(rows, reference, bounds))
+        scores = scores_of(rows, reference, bounds)
+        return cls(rows, planned, reference, command, jobs, scores, fronts)
 
     def circumstances(self) -> list[str]:
         """Command, extent, machine and versions, a line each."""
@@ -85,25 +89,30 @@ class Comparison:
             )
         return lines
 
+    def write(self, directory: Path) -> list[str]:
+        """Write all files; returns their names.
 
-def write(comparison: Comparison, directory: Path) -> list[str]:
-    """Write all files; returns their names.
+        Raises:
+            InputError: One cannot be written.
+        """
+        files = {
+            "table.csv": _csv(self.scores).encode(),
+            SCORES: _json(self).encode(),
+            TABLE: _markdown(self).encode(),
+            PICTURE: drawn(lambda: leaderboard_figure(self.scores, self.rows, self.reference)),
+        }
+        if fronts := self.fronts:
+            parts = [f"`{self.command}`\n"]
+            for name, choices in fronts.items():
+                parts += [f"{name}:\n", markdown(front_cells(choices))]
+            files[FRONT] = "\n".join(parts).encode()
+            files[FRONT_PICTURE] = drawn(lambda: front_figure(fronts))
+        there = {name: content for name, content in files.items() if content is not None}
+        write_files(directory, there)
+        return list(there)
 
-    Raises:
-        InputError: One cannot be written.
-    """
-    files = {
-        "table.csv": _csv(comparison.scores).encode(),
-        SCORES: _json(comparison).encode(),
-        TABLE: _markdown(comparison).encode(),
-        PICTURE: picture(comparison.scores, comparison.rows, comparison.reference),
-    }
-    there = {name: content for name, content in files.items() if content is not None}
-    write_files(directory, there)
-    return list(there)
 
-
-def published(directory: Path) -> tuple[list[Row], str]:
+def read_comparison(directory: Path) -> tuple[list[Row], str]:
     """The flights of a comparison and the label of its reference, from the files that it wrote.
 
     Raises:
@@ -160,7 +169,7 @@ def _json(comparison: Comparison) -> str:
         "reference": comparison.reference,
         "flights": len(comparison.rows),
         "planned": comparison.planned,
-        "scores": [dataclasses.asdict(one) for one in comparison.scores],
+        "scores": [one.plain() for one in comparison.scores],
     }
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -170,26 +179,34 @@ def _markdown(comparison: Comparison) -> str:
     labels = [one.label for one in comparison.scores]
     command, *circumstances = comparison.circumstances()
     parts = [f"`{command}`\n", *(f"{line}\n" for line in circumstances)]
-    parts.append(markdown(outcome_cells(comparison.scores)))
-    parts.append(markdown(effort_cells(comparison.scores)))
+    parts += [markdown(cells(comparison.scores, table)) for table in ("outcome", "effort")]
     if len(labels) > 1 and reference in labels:
-        parts.append(markdown(reference_cells(comparison.scores, reference)))
+        parts.append(markdown(cells(comparison.scores, "reference", reference)))
     parts += [f"{line}\n" for line in notes(rows, reference)]
-    failed = [row for row in rows if row.status == FAILED]
-    if failed:
-        parts.append("".join(f"- {line}\n" for line in failures(failed)))
+    if lines := failures(rows):
+        parts.append("".join(f"- {line}\n" for line in lines))
     parts.append("Energy and steps on each scenario, means of the accomplished flights:\n")
     parts.append(markdown(scenarios_cells(rows, labels)))
     return "\n".join(parts)
 
 
-def failures(failed: Sequence[Row]) -> list[str]:
-    """Why flights failed, a line for each reason of each planner."""
-    found: dict[tuple[str, str], list[Row]] = {}
-    for row in failed:
-        found.setdefault((row.label, row.reason or ""), []).append(row)
+def failures(rows: Sequence[Row]) -> list[str]:
+    """What is wrong with flights, a line for each reason of each planner: empty where nothing is.
+
+    They could not be flown, the independent checker disagrees, or figures could not be computed.
+    """
+    found: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        wrong = {
+            "failed": row.reason if row.status == FAILED else None,
+            "disagrees with the independent checker on": row.verdict if row.disagrees else None,
+            "lacks figures of": row.failed_figures,
+        }
+        for what, why in wrong.items():
+            if why is not None:
+                found.setdefault((row.label, what, why), []).append(row)
     return [
-        f"{label} failed {len(rows)} {'flight' if len(rows) == 1 else 'flights'} "
-        f"(first: {rows[0].scenario}, seed {rows[0].seed}): {reason}"
-        for (label, reason), rows in found.items()
+        f"{label} {what} {len(those)} {'flight' if len(those) == 1 else 'flights'} "
+        f"(first: {those[0].scenario}, seed {those[0].seed}): {why}"
+        for (label, what, why), those in found.items()
     ]

@@ -7,12 +7,8 @@ from pathlib import Path
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import meant
 from uas_coverage_env.leaderboard.hashing import content_hash
-from uas_coverage_env.scenario import (
-    Scenario,
-    installed_families,
-    load_scenario,
-    scenario_names,
-)
+from uas_coverage_env.scenario import Scenario, load_scenario, scenario_names
+from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.scenario.load import is_path
 
 # `dev` is there to look at while one tunes; nothing is ever tuned or trained on `test`

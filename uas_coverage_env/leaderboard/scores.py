@@ -1,13 +1,20 @@
-"""What the flights of a sweep say about each planner: pure functions of the rows."""
+"""What the flights of a sweep say about each planner: pure functions of the rows.
 
-import dataclasses
+Every figure of a flight (`flight.figures`) has a column; `_FURTHER` has those that need more than
+one figure, the bounds, or the flights of the reference.
+"""
+
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from uas_coverage_env.files.digits import three_digits
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.flight.figure import ByName, Figure
+from uas_coverage_env.flight.figures import figures
 from uas_coverage_env.leaderboard.bounds import Bounds
 from uas_coverage_env.leaderboard.row import FLOWN, Row
 from uas_coverage_env.leaderboard.statistics import (
@@ -20,84 +27,120 @@ from uas_coverage_env.leaderboard.statistics import (
     probability_of_improvement,
 )
 
+NOTHING = "–"
+
 _PERCENT = 100.0
-_MS_PER_S = 1000.0
+_SUFFIXES = {"%": "_percent", "ms": "_ms"}
+
+Value = int | float | Estimate | None
 
 
 @dataclass(frozen=True)
-class Scores:
-    """One planner with its options. Energy is that of flights without a violation.
+class Scores(ByName):
+    """One planner with its options.
 
     Attributes:
         label: Its label.
-        flights: How many rows, failed ones included.
-        failed: Flights that there are none of: refused, or crashed.
-        accomplished: Flights in which everything was covered, all UAS home, nothing touched.
-        all_home: Flights after which all UAS were home.
-        violating: Flights with a violation.
-        violations: Contacts and limits exceeded, in all flights.
-        breaches: Samples closer than the safe distances, in all flights.
-        fallbacks: Decisions flown on a fallback, in all flights.
-        filtered_percent: Mean over flights of the share of commands that the filter replaced.
-        coverage_percent: Interquartile mean; a failed flight covers nothing.
-        mean_coverage_percent: The mean, which one bad flight changes.
-        worst_coverage_percent: The least of all flights.
-        energy_Wh: Interquartile mean.
-        Wh_per_percent: Energy per percent covered, of flights that covered something.
-        steps: Interquartile mean of the makespan of accomplished flights.
-        above_bound_percent: Energy of accomplished flights beyond the least with which the mission
-            can be flown in as many steps (docs/bound.md); where that is known.
-        decision_p50_ms: Median over flights of the median time of a decision.
-        decision_p95_ms: Worst over flights of the 95th percentile.
-        relative_energy_percent: Interquartile mean of the energy in percent of the reference's
-            mean on the same scenario; the intervals of this and all further figures are over
-            scenarios, unless there is only one.
-        energy_difference_percent: Paired difference to the reference, where both accomplished.
-        steps_difference_percent: The same of the makespan.
-        improves_energy: Probability of needing less energy than the reference; a flight that is
-            not accomplished is worse than any that is.
-        improves_steps: The same of the makespan.
-        episode_return: Interquartile mean of the sum of all rewards, as the environments pay by
-            default; over all flights that there are, violating ones included.
+        figures: Column -> its value, see `columns`; they are attributes of it, too.
     """
 
     label: str
-    flights: int
-    failed: int
-    accomplished: int
-    all_home: int
-    violating: int
-    violations: int
-    breaches: int
-    fallbacks: int
-    filtered_percent: float
-    coverage_percent: Estimate
-    mean_coverage_percent: Estimate
-    worst_coverage_percent: float
-    energy_Wh: Estimate
-    Wh_per_percent: Estimate
-    steps: Estimate
-    above_bound_percent: Estimate
-    decision_p50_ms: float | None
-    decision_p95_ms: float | None
-    relative_energy_percent: Estimate
-    energy_difference_percent: Estimate
-    steps_difference_percent: Estimate
-    improves_energy: Estimate
-    improves_steps: Estimate
-    episode_return: Estimate
+    figures: Mapping[str, Value]
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data."""
+        values = self.figures.items()
+        return {
+            "label": self.label,
+            **{k: asdict(v) if isinstance(v, Estimate) else v for k, v in values},
+        }
 
     def flat(self) -> dict[str, Any]:
         """Plain columns: an estimate becomes NAME, NAME_low, NAME_high and NAME_n."""
-        columns: dict[str, Any] = {}
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
+        columns: dict[str, Any] = {"label": self.label}
+        for name, value in self.figures.items():
             if isinstance(value, Estimate):
-                columns[field.name] = value.value
-                columns |= {f"{field.name}_{k}": getattr(value, k) for k in ("low", "high", "n")}
+                columns[name] = value.value
+                columns |= {f"{name}_{k}": getattr(value, k) for k in ("low", "high", "n")}
             else:
-                columns[field.name] = value
+                columns[name] = value
         return columns
+
+
+@dataclass(frozen=True)
+class Flights:
+    """The flights of one planner, and what they are held against.
+
+    Attributes:
+        mine: By scenario.
+        theirs: Those of the reference, likewise.
+        over: What the intervals of plain figures are over.
+        compared: What those of comparisons are over: they are meant for more scenarios.
+        bounds: Least energies, as far as they are known.
+    """
+
+    mine: Sequence[Sequence[Row]]
+    theirs: Sequence[Sequence[Row]]
+    over: Over
+    compared: Over
+    bounds: Bounds
+
+    @property
+    def rows(self) -> list[Row]:
+        """All of the planner."""
+        return [row for scenario in self.mine for row in scenario]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a comparison's tables.
+
+    Attributes:
+        name: In the files.
+        heading: For people.
+        meaning: In a line, for the docs.
+        of: Its value for a planner.
+        form: How a number is printed; empty: with three digits.
+        table: In which it stands for people; empty: in the files alone.
+        text: How the value is printed, where that takes more: of the planner's scores.
+    """
+
+    name: str
+    heading: str
+    meaning: str
+    of: Callable[[Flights], Value]
+    form: str = ""
+    table: Literal["outcome", "effort", "reference", ""] = ""
+    text: Callable[[Scores], str] | None = None
+
+    def cell(self, scores: Scores) -> str:
+        """Its cell in the row of a planner."""
+        if self.text is not None:
+            return self.text(scores)
+        value = scores.figures[self.name]
+        if not isinstance(value, Estimate):
+            return NOTHING if value is None else self._number(value)
+        if value.value is None:
+            return NOTHING
+        if value.low is None or value.high is None:
+            return self._number(value.value)
+        return (
+            f"{self._number(value.value)} [{self._number(value.low)}, {self._number(value.high)}]"
+        )
+
+    def _number(self, value: float) -> str:
+        return format(value, self.form) if self.form else three_digits(value)
+
+
+def columns() -> dict[str, Column]:
+    """All columns by name: those of figures in their order, then those made of several."""
+    ours = [_of_figure(each) for each in figures().values() if each.in_rows]
+    found: dict[str, Column] = {}
+    for column in (*_COUNTED, *_FURTHER, *ours):
+        if found.setdefault(column.name, column) is not column:
+            raise InputError(f"two columns of a comparison are called {column.name!r}; rename one")
+    places = [column.name for column in (*_COUNTED, *ours, *_FURTHER)]
+    return {name: found[name] for name in places}
 
 
 def drawn_anew(rows: Sequence[Row]) -> Over:
@@ -119,12 +162,16 @@ def scores_of(
     """
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
     over = drawn_anew(rows)
+    compared: Over = "scenarios" if len(scenarios) > 1 else "seeds"
     tables = {
         label: _by_scenario([row for row in rows if row.label == label], scenarios)
         for label in dict.fromkeys(row.label for row in rows)
     }
     theirs = tables.get(reference, [[] for _ in scenarios])
-    found = [_scores(label, mine, theirs, over, bounds) for label, mine in tables.items()]
+    found = []
+    for label, mine in tables.items():
+        flights = Flights(mine, theirs, over, compared, bounds)
+        found.append(Scores(label, {name: each.of(flights) for name, each in columns().items()}))
     return sorted(found, key=_place)
 
 
@@ -138,54 +185,69 @@ def _place(scores: Scores) -> tuple[Any, ...]:
     )
 
 
-def _scores(
-    label: str,
-    mine: Sequence[Sequence[Row]],
-    theirs: Sequence[Sequence[Row]],
-    over: Over,
-    bounds: Bounds,
-) -> Scores:
-    rows = [row for scenario in mine for row in scenario]
-    # a comparison is meant for more than these scenarios
-    compared: Over = "scenarios" if len(mine) > 1 else "seeds"
-    coverage = _values(mine, lambda row: _PERCENT * row.coverage)
-    return Scores(
-        label=label,
-        flights=len(rows),
-        failed=sum(row.status != FLOWN for row in rows),
-        accomplished=sum(row.accomplished for row in rows),
-        all_home=sum(row.all_home for row in rows),
-        violating=sum(row.violations > 0 for row in rows),
-        violations=sum(row.violations for row in rows),
-        breaches=sum(row.breaches for row in rows),
-        fallbacks=sum(row.fallbacks for row in rows),
-        filtered_percent=_PERCENT * _filtered_share(rows),
-        coverage_percent=estimate(coverage, over),
-        mean_coverage_percent=estimate(coverage, over, mean),
-        worst_coverage_percent=_PERCENT * min(row.coverage for row in rows),
-        energy_Wh=estimate(_values(mine, _ranked_energy_Wh), over),
-        Wh_per_percent=estimate(_values(mine, _Wh_per_percent), over),
-        steps=estimate(_values(mine, lambda row: row.steps if row.accomplished else None), over),
-        above_bound_percent=estimate(
-            _values(mine, lambda row: _above_bound(row, bounds)), compared, mean
-        ),
-        decision_p50_ms=_ms(np.median, [row.decision_p50_s for row in rows]),
-        decision_p95_ms=_ms(np.max, [row.decision_p95_s for row in rows]),
-        relative_energy_percent=_relative_energy(mine, theirs, compared),
-        energy_difference_percent=_paired(mine, theirs, lambda row: row.energy_Wh),
-        steps_difference_percent=_paired(mine, theirs, lambda row: row.steps),
-        improves_energy=_improves(mine, theirs, lambda row: row.energy_Wh, compared),
-        improves_steps=_improves(mine, theirs, lambda row: row.steps, compared),
-        episode_return=estimate(_values(mine, lambda row: row.episode_return), over),
-    )
-
-
-def _filtered_share(rows: Sequence[Row]) -> float:
-    shares = [row.filtered_share for row in rows if row.status == FLOWN]
-    return float(np.mean(shares)) if shares else 0.0
-
-
 Measure = Callable[[Row], float | None]
+
+
+def _of_figure(figure: Figure) -> Column:
+    """The column of a figure: over flights it is summed up as it says, a truth is counted."""
+    unit, name = figure.printed_unit, figure.name
+    if unit in _SUFFIXES:
+        name = f"{name.removesuffix('_share').removesuffix('_s')}{_SUFFIXES[unit]}"
+    heading = figure.label if unit != "%" else f"{figure.title}, %"
+    over = "total" if figure.kind is bool else figure.over
+    whole = over == "total" and figure.kind is not float
+    digits = 1 if unit == "%" or figure.kind is not float else figure.digits
+    form = "d" if whole else "" if unit == "ms" else f".{digits}f"
+
+    def measure(row: Row) -> float | None:
+        value = getattr(row, figure.name) if _COUNTS[figure.counts](row) else None
+        return None if value is None else figure.scale * value
+
+    def of(flights: Flights) -> Value:
+        if over == "mean":
+            return estimate(_values(flights.mine, measure), flights.over)
+        there = [value for row in flights.rows if (value := measure(row)) is not None]
+        if whole:
+            return int(sum(there))
+        return float(_SUMMED_UP[over](there)) if there else None
+
+    def counted(scores: Scores) -> str:
+        return f"{scores.figures[name]}/{scores.flights}"
+
+    meaning = f"{_OVER[over]} `{figure.name}`{_OF[figure.counts]}"
+    if figure.kind is bool:
+        meaning = f"flights with `{figure.name}`"
+    text = counted if figure.kind is bool else None
+    return Column(name, heading, meaning, of, form, figure.table, text)
+
+
+_OVER = {
+    "mean": "interquartile mean of",
+    "average": "mean of",
+    "total": "sum of",
+    "median": "median of",
+    "least": "least",
+    "most": "largest",
+}
+_OF = {
+    "all": "",
+    "flown": "",
+    "unharmed": ", of flights without a violation",
+    "accomplished": ", of accomplished flights",
+}
+_COUNTS: dict[str, Callable[[Row], bool]] = {
+    "all": lambda row: True,
+    "flown": lambda row: row.status == FLOWN,
+    "unharmed": lambda row: row.ranked,
+    "accomplished": lambda row: row.accomplished,
+}
+_SUMMED_UP: dict[str, Callable[[Sequence[float]], Any]] = {
+    "total": sum,
+    "average": np.mean,
+    "median": np.median,
+    "least": min,
+    "most": max,
+}
 
 
 def _by_scenario(rows: Sequence[Row], scenarios: Sequence[str]) -> list[list[Row]]:
@@ -201,15 +263,24 @@ def _values(table: Sequence[Sequence[Row]], measure: Measure) -> list[FloatArray
     return [np.array([v for v in values if v is not None], float) for values in columns]
 
 
+def _number_of(rows: Callable[[Row], bool]) -> Callable[[Flights], int]:
+    return lambda flights: sum(map(rows, flights.rows))
+
+
+def _disagreeing(flights: Flights) -> int | None:
+    """How many flights the independent checker disagrees with; None: it was not asked."""
+    asked = [row for row in flights.rows if row.verdict is not None]
+    return sum(row.disagrees for row in asked) if asked else None
+
+
+def _coverage(summed_up: Callable[..., FloatArray]) -> Callable[[Flights], Estimate]:
+    return lambda flights: estimate(
+        _values(flights.mine, lambda row: _PERCENT * row.coverage), flights.over, summed_up
+    )
+
+
 def _ranked_energy_Wh(row: Row) -> float | None:
     return row.energy_Wh if row.ranked else None
-
-
-def _above_bound(row: Row, bounds: Bounds) -> float | None:
-    least_Wh = bounds.get((row.scenario, row.steps or 0)) if row.accomplished else None
-    if row.energy_Wh is None or not least_Wh:
-        return None
-    return _PERCENT * (row.energy_Wh / least_Wh - 1.0)
 
 
 def _Wh_per_percent(row: Row) -> float | None:
@@ -219,41 +290,88 @@ def _Wh_per_percent(row: Row) -> float | None:
     return energy_Wh / (_PERCENT * row.coverage)
 
 
-def _relative_energy(
-    mine: Sequence[Sequence[Row]], theirs: Sequence[Sequence[Row]], over: Over
-) -> Estimate:
+def _above_bound(flights: Flights) -> Estimate:
+    def above(row: Row) -> float | None:
+        least_Wh = flights.bounds.get((row.scenario, row.steps or 0)) if row.accomplished else None
+        if row.energy_Wh is None or not least_Wh:
+            return None
+        return _PERCENT * (row.energy_Wh / least_Wh - 1.0)
+
+    return estimate(_values(flights.mine, above), flights.compared, mean)
+
+
+def _relative_energy(flights: Flights) -> Estimate:
     parts = [
         _PERCENT * m / t.mean() if len(t) and t.mean() else np.empty(0)
         for m, t in zip(
-            _values(mine, _ranked_energy_Wh), _values(theirs, _ranked_energy_Wh), strict=True
+            _values(flights.mine, _ranked_energy_Wh),
+            _values(flights.theirs, _ranked_energy_Wh),
+            strict=True,
         )
     ]
-    return estimate(parts, over)
+    return estimate(parts, flights.compared)
 
 
-def _paired(
-    mine: Sequence[Sequence[Row]], theirs: Sequence[Sequence[Row]], measure: Measure
-) -> Estimate:
+def _paired(figure: str) -> Callable[[Flights], Estimate]:
     """Of flights on the same scenario with the same seed that both accomplished."""
-    differences = []
-    for my_rows, their_rows in zip(mine, theirs, strict=True):
-        there = {row.seed: measure(row) for row in their_rows if row.accomplished}
-        pairs = [(measure(r), there.get(r.seed)) for r in my_rows if r.accomplished]
-        differences.append(
-            np.array([_PERCENT * (m / t - 1.0) for m, t in pairs if m is not None and t], float)
-        )
-    return paired_difference(differences)
+
+    def difference(flights: Flights) -> Estimate:
+        differences = []
+        for my_rows, their_rows in zip(flights.mine, flights.theirs, strict=True):
+            there = {row.seed: getattr(row, figure) for row in their_rows if row.accomplished}
+            pairs = [(getattr(r, figure), there.get(r.seed)) for r in my_rows if r.accomplished]
+            differences.append(
+                np.array([_PERCENT * (m / t - 1.0) for m, t in pairs if m is not None and t], float)
+            )
+        return paired_difference(differences)
+
+    return difference
 
 
-def _improves(
-    mine: Sequence[Sequence[Row]], theirs: Sequence[Sequence[Row]], measure: Measure, over: Over
-) -> Estimate:
+def _improves(figure: str) -> Callable[[Flights], Estimate]:
     def value(row: Row) -> float | None:
-        return measure(row) if row.accomplished else np.inf
+        return getattr(row, figure) if row.accomplished else np.inf
 
-    return probability_of_improvement(_values(mine, value), _values(theirs, value), over)
+    return lambda flights: probability_of_improvement(
+        _values(flights.mine, value), _values(flights.theirs, value), flights.compared
+    )
 
 
-def _ms(summed_up: Callable[..., Any], times_s: Sequence[float | None]) -> float | None:
-    there = [time_s for time_s in times_s if time_s is not None]
-    return _MS_PER_S * float(summed_up(there)) if there else None
+def _flights(scores: Scores) -> str:
+    return f"{scores.flights} ({scores.failed} failed)" if scores.failed else str(scores.flights)
+
+
+_COUNTED = (
+    Column("flights", "flights", "rows, those that failed included", lambda it: len(it.rows),
+           table="outcome", text=_flights),
+    Column("failed", "failed", "there is no flight: the planner refused the mission, or crashed",
+           _number_of(lambda row: row.status != FLOWN), "d"),
+    Column("disagreeing", "check disagrees", "flights with which the independent checker disagrees "
+           "(`--check`)", _disagreeing, "d", "outcome"),
+)  # fmt: skip
+
+_FURTHER = (
+    Column("violating", "violating", "flights with a violation",
+           _number_of(lambda row: row.violations > 0), "d", "outcome"),
+    Column("worst_coverage_percent", "worst, %", "the least covered of all flights",
+           lambda it: _PERCENT * min(row.coverage for row in it.rows), ".0f", "outcome"),
+    Column("mean_coverage_percent", "mean covered, %", "the mean, which one bad flight changes",
+           _coverage(mean), ".1f"),
+    Column("Wh_per_percent", "Wh per % covered", "of flights without a violation that covered "
+           "something", lambda it: estimate(_values(it.mine, _Wh_per_percent), it.over), ".3f",
+           "effort"),
+    Column("above_bound_percent", "above the bound, %", "energy beyond the [least](bound.md) with "
+           "which the mission can be flown in as many steps, mean over accomplished flights in the "
+           "LPV model", _above_bound, ".1f", "effort"),
+    Column("energy_difference_percent", "Δ energy, %", "mean difference over pairs of accomplished "
+           "flights with the same scenario and seed", _paired("energy_Wh"), "+.1f", "reference"),
+    Column("steps_difference_percent", "Δ steps, %", "likewise", _paired("steps"), "+.1f",
+           "reference"),
+    Column("improves_energy", "P(less energy)", "probability that a flight beats one of the "
+           "reference on the same scenario, ties counting half; one that is not accomplished loses "
+           "to any that is", _improves("energy_Wh"), ".2f", "reference"),
+    Column("improves_steps", "P(fewer steps)", "likewise", _improves("steps"), ".2f", "reference"),
+    Column("relative_energy_percent", "energy, % of the reference's", "of flights without a "
+           "violation, in percent of the reference's mean on the same scenario", _relative_energy,
+           ".1f", "reference"),
+)  # fmt: skip

@@ -6,11 +6,11 @@ from functools import cached_property
 from importlib.metadata import version
 from typing import Any
 
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
 from uas_coverage_env.leaderboard.planner_specs import PlannerSpec
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.simulation import Dynamics
 
 PACKAGE = "uas-coverage-env"
 
@@ -35,7 +35,7 @@ class Entry:
     scenario_sha256: str
     spec: PlannerSpec
     seed: int
-    dynamics: Dynamics = "lpv"
+    dynamics: DynamicsName = "lpv"
     safety_filter: bool | None = None
     return_mode: bool | None = None
     reward_weights: Mapping[str, float] = field(default_factory=dict)
@@ -75,7 +75,7 @@ class Sweep:
     scenarios: Mapping[str, Scenario]
     planners: Mapping[str, PlannerSpec]
     seeds: range
-    dynamics: Dynamics = "lpv"
+    dynamics: DynamicsName = "lpv"
     safety_filter: bool = False
 
     @property

@@ -4,78 +4,37 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.leaderboard.row import FLOWN, Row
-from uas_coverage_env.leaderboard.scores import Scores, drawn_anew
-from uas_coverage_env.leaderboard.statistics import Estimate
-
-NOTHING = "–"
+from uas_coverage_env.leaderboard.scores import NOTHING, Scores, columns, drawn_anew
 
 Cells = tuple[list[str], list[list[str]]]
 
 
-def outcome_cells(scores: Sequence[Scores]) -> Cells:
-    """Headings and rows: what was achieved, and what went wrong."""
-    headings = [
-        *("planner", "flights", "accomplished", "covered, %", "worst", "all home"),
-        *("violations", "breaches", "fallbacks", "filtered, %", "return"),
+def cells(scores: Sequence[Scores], table: str, reference: str | None = None) -> Cells:
+    """Headings and rows of the columns of a table.
+
+    Args:
+        scores: A row each; at least one.
+        table: `outcome`: what was achieved, and what went wrong; `effort`: what it took;
+            `reference`: beside the reference, which has no row of its own.
+        reference: Its label, for that table.
+    """
+    shown = [
+        column
+        for name, column in columns().items()
+        # what no planner has been asked is not shown
+        if column.table == table and any(one.figures[name] is not None for one in scores)
     ]
+    pairs = ["pairs"] if table == "reference" else []
+    headings = ["planner", *pairs, *(column.heading for column in shown)]
     return headings, [
         [
             one.label,
-            f"{one.flights} ({one.failed} failed)" if one.failed else str(one.flights),
-            f"{one.accomplished}/{one.flights}",
-            _text(one.coverage_percent, ".1f"),
-            f"{one.worst_coverage_percent:.0f}",
-            f"{one.all_home}/{one.flights}",
-            f"{one.violations} in {one.violating}" if one.violations else "0",
-            str(one.breaches),
-            str(one.fallbacks),
-            f"{one.filtered_percent:.1f}",
-            _text(one.episode_return, ".1f"),
+            *(str(one.energy_difference_percent.n) for _ in pairs),
+            *(column.cell(one) for column in shown),
         ]
         for one in scores
-    ]
-
-
-def effort_cells(scores: Sequence[Scores]) -> Cells:
-    """Headings and rows: what it took."""
-    headings = [
-        *("planner", "energy, Wh", "above the bound, %", "Wh per % covered", "steps"),
-        *("decision p50, ms", "p95, ms"),
-    ]
-    return headings, [
-        [
-            one.label,
-            _text(one.energy_Wh, ".2f"),
-            _text(one.above_bound_percent, ".1f"),
-            _text(one.Wh_per_percent, ".3f"),
-            _text(one.steps, ".1f"),
-            _milliseconds(one.decision_p50_ms),
-            _milliseconds(one.decision_p95_ms),
-        ]
-        for one in scores
-    ]
-
-
-def reference_cells(scores: Sequence[Scores], reference: str) -> Cells:
-    """Headings and rows of the comparison with the reference; it has no row of its own."""
-    headings = [
-        *("planner", "pairs", "Δ energy, %", "Δ steps, %"),
-        *("P(less energy)", "P(fewer steps)", "energy, % of the reference's"),
-    ]
-    return headings, [
-        [
-            one.label,
-            str(one.energy_difference_percent.n),
-            _text(one.energy_difference_percent, "+.1f"),
-            _text(one.steps_difference_percent, "+.1f"),
-            _text(one.improves_energy, ".2f"),
-            _text(one.improves_steps, ".2f"),
-            _text(one.relative_energy_percent, ".1f"),
-        ]
-        for one in scores
-        if one.label != reference
+        if table != "reference" or one.label != reference
     ]
 
 
@@ -156,18 +115,6 @@ def _scenario_cell(rows: Sequence[Row]) -> str:
     steps = sum(row.steps or 0 for row in done) / len(done)
     some = "" if len(done) == len(rows) else f" ({len(done)}/{len(rows)})"
     return f"{energy_Wh:.2f} Wh, {steps:.0f}{some}"
-
-
-def _text(found: Estimate, form: str) -> str:
-    if found.value is None:
-        return NOTHING
-    if found.low is None or found.high is None:
-        return format(found.value, form)
-    return f"{found.value:{form}} [{found.low:{form}}, {found.high:{form}}]"
-
-
-def _milliseconds(value_ms: float | None) -> str:
-    return NOTHING if value_ms is None else three_digits(value_ms)
 
 
 def _escaped(cell: str) -> str:

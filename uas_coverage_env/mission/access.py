@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.scenario import NoFlyZone, free_places_m
-from uas_coverage_env.world import NO_WAY, Arena, build_arena, crossing, route
+from uas_coverage_env.scenario import NoFlyZone
+from uas_coverage_env.scenario.checks import free_places_m
+from uas_coverage_env.world import Arena, build_arena
 from uas_coverage_env.world.corners import route_corners
+from uas_coverage_env.world.routes import NO_WAY, crossing, route
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

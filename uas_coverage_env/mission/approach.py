@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import velocity_of
+from uas_coverage_env.autopilot.guidance import velocity_of
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.views import WorldView
 from uas_coverage_env.world import Arena, GoTo, SwarmState, Velocity

@@ -8,9 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.ways import Ways
-from uas_coverage_env.world import HOME, SwarmState
+from uas_coverage_env.world import SwarmState
 
 BoolArray = NDArray[np.bool_]
 

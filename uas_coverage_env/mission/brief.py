@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.scenario import (
-    Conditions,
     Decoration,
     Execution,
     Geofence,
@@ -24,6 +23,7 @@ from uas_coverage_env.scenario import (
     Uas,
     Waypoint,
 )
+from uas_coverage_env.scenario.conditions import Conditions
 from uas_coverage_env.scenario.payload import who_covers
 from uas_coverage_env.vehicle import VehicleParams
 

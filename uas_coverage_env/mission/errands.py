@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.range import Range
 from uas_coverage_env.mission.ways import Ways
-from uas_coverage_env.vehicle import DOD, N_STATES, dod_per_s
+from uas_coverage_env.vehicle.layout import DOD, N_STATES
+from uas_coverage_env.vehicle.range import dod_per_s
 
 
 @dataclass(frozen=True)

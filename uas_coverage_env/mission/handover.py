@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.world import FLYING, LANDED, SwarmState
+from uas_coverage_env.world import SwarmState
 
 BoolArray = NDArray[np.bool_]
 

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.belief import MOST_WIND, wind_growth
-from uas_coverage_env.entities.state import N_BELIEF, WIND
+from uas_coverage_env.entities.state import FLYING, N_BELIEF, WIND
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.tube import belief_gain
-from uas_coverage_env.world import FLYING, Arena, SwarmState
+from uas_coverage_env.world import Arena, SwarmState
 
 FloatArray = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from uas_coverage_env.autopilot.belief import (
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.mission.leg_model import Autopilot
+from uas_coverage_env.planning.execution.leg_model import Autopilot
 from uas_coverage_env.planning.reserves import ROUTED
 from uas_coverage_env.vehicle.range import (
     SpeedLimits,
@@ -34,7 +34,8 @@ from uas_coverage_env.vehicle.range import (
     speeds_of,
     vertical_seconds,
 )
-from uas_coverage_env.world import CLEAR, IN_SIGHT, build_arena, crossing, route
+from uas_coverage_env.world import build_arena
+from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, crossing, route
 
 FloatArray = NDArray[np.float64]
 _AGILITY = 0.75  # share of the largest horizontal acceleration that a turn uses on average

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import flight_home as seconds_home
+from uas_coverage_env.autopilot.return_path import flight_home
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import build_arena
 
@@ -53,7 +53,7 @@ class Range:
             uas: Index of the UAS.
             x: (14,) its state, in the order of `vehicle.layout`.
         """
-        time_s, time_margin_s = seconds_home(self._arena, uas, x)
+        time_s, time_margin_s = flight_home(self._arena, uas, x)
         per_s = dod_per_s(self._brief.vehicles[uas], float(x[DOD]))
         return ReturnEstimate(time_s, time_margin_s, per_s * time_s, per_s * time_margin_s)
 

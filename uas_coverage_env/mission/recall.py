@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot import has_to_return
+from uas_coverage_env.autopilot.return_mode import has_to_return
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission.views import WorldView
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.world import SwarmState
 
 BoolArray = NDArray[np.bool_]
 

@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.simulation import World, initial_state
+from uas_coverage_env.simulation import World
+from uas_coverage_env.simulation.world import initial_state
 from uas_coverage_env.world import SwarmState, build_arena
 
 

@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.planning.reserves import ROUTED
 from uas_coverage_env.vehicle.range import flight_seconds, speeds_of
-from uas_coverage_env.world import CLEAR, HOME, build_arena, crossing, route
-from uas_coverage_env.world.routes import ROUND_CORNER
+from uas_coverage_env.world import build_arena
+from uas_coverage_env.world.routes import CLEAR, ROUND_CORNER, crossing, route
 
 FloatArray = NDArray[np.float64]
 

@@ -9,6 +9,9 @@ from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.record import LANDED
 from uas_coverage_env.world.packs import pack_records
 
+TAKE_OFF_HEIGHT_M = 3.0
+"""Height at which a take-off ends and a landing begins."""
+
 
 class Sortie(NamedTuple):
     """One of them.

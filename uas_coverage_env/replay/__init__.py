@@ -5,7 +5,6 @@ Everything is made from a `Flight`; nothing is simulated again. matplotlib and i
 """
 
 from uas_coverage_env.replay.film import write_gif, write_video
-from uas_coverage_env.replay.live import LivePage
 from uas_coverage_env.replay.page import replay_page, write_replay
 
-__all__ = ["LivePage", "replay_page", "write_gif", "write_replay", "write_video"]
+__all__ = ["replay_page", "write_gif", "write_replay", "write_video"]

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.plain_files import written_by
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Flight, flight_pictures
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.picture import flight_pictures
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -7,19 +7,26 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, Flight, SceneHistory, seen_pictures, summary
+from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight.figure import NOTHING
+from uas_coverage_env.flight.figures import printed
+from uas_coverage_env.flight.metrics import energy_until_Wh
+from uas_coverage_env.flight.scene_history import SceneHistory
+from uas_coverage_env.flight.seen import seen_pictures
 from uas_coverage_env.replay.home_data import way_home
 from uas_coverage_env.replay.mark_data import marks
 from uas_coverage_env.replay.reach_data import reach
+from uas_coverage_env.replay.runs import mode_runs
 from uas_coverage_env.replay.safety_data import floors_m, rooms
-from uas_coverage_env.replay.scene_data import hex_colour, scene_data
+from uas_coverage_env.replay.scene_data import scene_data
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 POSITION_M = 0.01
 PLAN_M = 0.1
 ANGLE_RAD = 0.001
 SOC = 0.0001
+ENERGY_Wh = 0.001
 VOLTAGE_V = 0.001
 CURRENT_A = 0.01
 DURATION_S = 0.00001
@@ -28,9 +35,12 @@ FLOOR_M = 0.1
 SEEN_M = 0.1
 SHARE = 0.0001
 
+_OUTCOME = ("steps", "energy_Wh", "all_home", "breaches")
+"""Figures of the line below the title; all of them are in a table that opens."""
+
 
 def flight_data(flight: Flight, source: str) -> dict[str, Any]:
-    """A flight as plain data for the viewer (`viewer/src/flight.ts` reads it).
+    """A flight as plain data for the viewer (`viewer/src/flight_data.ts` has its types).
 
     A series is `{"unit": u, "values": [whole numbers]}`, the value being their product; its axes
     are, slowest first, time T, UAS U (or moving obstacles M), and components.
@@ -42,12 +52,12 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
     Raises:
         InputError: A value of the flight is not finite, so that it has no place in a picture.
     """
-    outcome = summary(flight)
     durations_s = np.array([decision.duration_s for decision in flight.decisions])
     series = {
         "position": (flight.x[..., 0:3], POSITION_M),
         "attitude": (flight.attitude_rad, ANGLE_RAD),
         "soc": (1.0 - flight.x[..., DOD], SOC),
+        "energy": (energy_until_Wh(flight), ENERGY_Wh),
         "voltage": (flight.voltage_V, VOLTAGE_V),
         "current": (flight.current_A, CURRENT_A),
         "duration": (durations_s, DURATION_S),
@@ -68,7 +78,7 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "needed": _series(home.needed_soc, SOC, "charge for the way home", source),
         "floor": _series(floors_m(flight, history), FLOOR_M, "roofs", source),
         "modes": list(MODES),
-        "mode": flight.mode.ravel().tolist(),
+        "mode_runs": [list(mode_runs(flight, i)) for i in range(len(flight.names))],
         "last": flight.last_sample.tolist(),
         "covered": flight.covered.tolist(),
         "covered_at": history.covered_at.tolist(),
@@ -81,10 +91,9 @@ def flight_data(flight: Flight, source: str) -> dict[str, Any]:
         "no_return": list(home.no_return),
         "least_spare": [[sample, round(spare, 4)] for sample, spare in home.least_spare],
         "marks": marks(flight, history, room, home),
-        "violations": outcome["violations"],
-        "summary": {
-            key: outcome[key] for key in ("coverage", "steps", "energy_Wh", "all_home", "breaches")
-        },
+        "violations": flight.figures["violations"],
+        "summary": {name: flight.figures[name] for name in _OUTCOME},
+        "figures": [[name, text] for name, text in printed(flight).items() if text != NOTHING],
     }
 
 
@@ -120,7 +129,7 @@ def _seen(flight: Flight, source: str) -> list[dict[str, Any]]:
     return [
         {
             "sensor": seen.sensor,
-            "colour": hex_colour(colours.SEEN[n % len(colours.SEEN)]),
+            "colour": colours.hex_of(colours.SEEN[n % len(colours.SEEN)]),
             "sample": seen.sample.tolist(),
             "corners": _series(seen.corners_m, SEEN_M, "ground seen", source),
             "share": _series(seen.share, SHARE, "ground seen", source),

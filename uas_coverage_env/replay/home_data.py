@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight import Flight, SceneHistory
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.mission import MissionBrief, Range
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 
 @dataclass(frozen=True)

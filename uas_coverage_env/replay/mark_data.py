@@ -1,13 +1,14 @@
 """What happened when: marks on the time axis of a replay page, each with its reason."""
 
 from collections.abc import Iterator, Sequence
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 
-from uas_coverage_env.flight import Flight, SceneHistory
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.replay.home_data import WayHome
+from uas_coverage_env.replay.runs import runs
 from uas_coverage_env.replay.safety_data import (
     FENCE,
     HEIGHT,
@@ -22,7 +23,6 @@ LARGE_GAP = 0.05
 """A decision that was solved to a larger gap than this is marked."""
 
 _TOLERANCE_M = 1e-6
-_Reason = tuple[str, str]  # what is said, and of whom
 
 
 def marks(
@@ -67,7 +67,7 @@ def _breaches(
         for i, name in enumerate(flight.names):
             near = room_m[:, i] < -_TOLERANCE_M
             near[0] = False  # where a mission begins is given
-            for first, last in _runs(np.where(near, which[:, i], -1).tolist()):
+            for first, last in _spans(np.where(near, which[:, i], -1).tolist()):
                 worst_m = -float(room_m[first : last + 1, i].min())
                 partner = _partner(scenario, kind, int(which[first, i]))
                 if kind == HEIGHT:
@@ -103,14 +103,14 @@ def _fallbacks(flight: Flight) -> Iterator[dict[str, Any]]:
         (decision.reason or "no reason given") if decision.fallback else ""
         for decision in flight.decisions
     ]
-    for first, last in _runs([reason or -1 for reason in reasons]):
+    for first, last in _spans([reason or -1 for reason in reasons]):
         count = f" ({last - first + 1} decisions)" if last > first else ""
         yield _mark(flight, first, last, "fallback", f"fallback{count}: {reasons[first]}")
 
 
 def _gaps(flight: Flight) -> Iterator[dict[str, Any]]:
     gaps = [decision.mip_gap or 0.0 for decision in flight.decisions]
-    for first, last in _runs([0 if gap > LARGE_GAP else -1 for gap in gaps]):
+    for first, last in _spans([0 if gap > LARGE_GAP else -1 for gap in gaps]):
         largest = max(gaps[first : last + 1])
         count = f"{last - first + 1} decisions" if last > first else "decision"
         yield _mark(flight, first, last, "gap", f"{count} solved to a gap of {largest:.0%} at most")
@@ -146,9 +146,6 @@ def _of_log(flight: Flight) -> Iterator[dict[str, Any]]:
         yield _mark(flight, first, last, "not known", text, unknown.uas)
 
 
-def _runs(values: Sequence[Any]) -> Iterator[tuple[int, int]]:
+def _spans(values: Sequence[Any]) -> Iterator[tuple[int, int]]:
     """First and last index of each run of equal values that are not -1."""
-    for value, run in groupby(enumerate(values), key=lambda pair: pair[1]):
-        indices = [index for index, _ in run]
-        if value != -1:
-            yield indices[0], indices[-1]
+    return ((first, after - 1) for value, first, after in runs(values) if value != -1)

@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from uas_coverage_env.draw.colours import page_style
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
@@ -84,7 +85,7 @@ def replay_page(
 
 def page_of(data: Sequence[Mapping[str, Any]], *, live: str | None = None) -> str:
     """`replay_page` of what `flight_data` says of each flight."""
-    script, style = _part("viewer.js"), _part("viewer.css")
+    script, style = _part("viewer.js"), page_style() + _part("viewer.css")
     title = " and ".join(f"{flight['scene']['name']}, {flight['planner']}" for flight in data)
     return _PAGE.format(
         policy=html.escape(_policy(script, style, live is not None)),

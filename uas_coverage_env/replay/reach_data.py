@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.mission import MissionBrief, Range
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, N_STATES
+from uas_coverage_env.vehicle.layout import DOD, N_STATES
 from uas_coverage_env.vehicle.range import CALIBRATED, dod_per_s, level_seconds, speeds_of
 
 GRID = 21

@@ -6,7 +6,8 @@ Distances are those by which flights are judged (docs/rules.md), at the samples.
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.flight import MODES, Flight, SceneHistory
+from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
 
 FAR_M = 50.0
@@ -35,68 +36,73 @@ def rooms(flight: Flight, history: SceneHistory) -> dict[str, Nearest]:
         Kind -> ((T, U) [m], negative where it is a breach, at most `FAR_M`, which is also where a
         UAS does not fly; (T, U) index of what is nearest, -1: of nothing).
     """
-    scenario = history.scenario
-    at_m, samples = flight.x[..., :3], np.arange(len(flight.x))[:, None]
-    radii_m = np.array([uas.radius_m for uas in scenario.uas])
+    samples = np.arange(len(flight.x))[:, None]
     flies = samples <= flight.last_sample
     flies &= (flight.mode < MODES.index("landed")) & ~flight.resting
-    found: dict[str, Nearest] = {}
+    each_m = {
+        OBSTACLES: _to_obstacles(flight, history),
+        MOVING: _to_moving(flight, history),
+        OTHERS: _to_others(flight, flies),
+        FENCE: [_to_fence(flight, history)],
+        HEIGHT: _above(flight, history),
+    }
+    return {kind: _nearest(of_kind, flies) for kind, of_kind in each_m.items() if of_kind}
 
-    def add(kind: str, each_m: list[FloatArray]) -> None:
-        if each_m:
-            found[kind] = _nearest(each_m, flies)
 
-    add(
-        OBSTACLES,
-        [
-            np.where(
-                samples >= since,
-                hull.signed_distance(at_m) - radii_m - obstacle.safe_distance_m,
-                np.inf,
-            )
-            for obstacle, hull, since in zip(
-                scenario.obstacles, scenario.hulls, history.obstacle_from, strict=True
-            )
-        ],
-    )
-    add(
-        MOVING,
-        [
-            np.where(
-                samples >= history.moving_from[m],
-                _outside(
-                    at_m - history.moving_position_m[:, None, m],
-                    obstacle.radius_m,
-                    obstacle.height_m / 2.0,
-                )
-                - radii_m
-                - obstacle.safe_distance_m,
-                np.inf,
-            )
-            for m, obstacle in enumerate(scenario.moving_obstacles)
-        ],
-    )
-    if len(radii_m) > 1:
-        add(
-            OTHERS,
-            [
-                np.where(
-                    flies[:, j, None] & (np.arange(len(radii_m)) != j),
-                    _outside(at_m - at_m[:, j, None])
-                    - radii_m
-                    - radii_m[j]
-                    - scenario.uas_safe_distance_m,
-                    np.inf,
-                )
-                for j in range(len(radii_m))
-            ],
+def _radii_m(flight: Flight) -> FloatArray:
+    return np.array([uas.radius_m for uas in flight.scenario.uas])
+
+
+def _to_obstacles(flight: Flight, history: SceneHistory) -> list[FloatArray]:
+    """(T, U) [m] room to each fixed obstacle; infinite before it is there."""
+    scenario, samples = history.scenario, np.arange(len(flight.x))[:, None]
+    return [
+        np.where(
+            samples >= since,
+            hull.signed_distance(flight.x[..., :3]) - _radii_m(flight) - obstacle.safe_distance_m,
+            np.inf,
         )
-    add(FENCE, [-scenario.fence.signed_distance(at_m) - scenario.geofence.margin_m])
-    if scenario.min_height_m > 0.0:
-        away_m = np.linalg.norm(at_m[..., :2] - history.home_m[..., :2], axis=-1)
-        low = np.where(away_m <= scenario.landing_zone_m, np.inf, _height_room(flight, history))
-        add(HEIGHT, [low])
+        for obstacle, hull, since in zip(
+            scenario.obstacles, scenario.hulls, history.obstacle_from, strict=True
+        )
+    ]
+
+
+def _to_moving(flight: Flight, history: SceneHistory) -> list[FloatArray]:
+    """(T, U) [m] room to each moving obstacle; infinite before it is there."""
+    samples, places_m = np.arange(len(flight.x))[:, None], history.moving_position_m
+    found = []
+    for m, obstacle in enumerate(history.scenario.moving_obstacles):
+        way_m = flight.x[..., :3] - places_m[:, None, m]
+        outside_m = _outside(way_m, obstacle.radius_m, obstacle.height_m / 2.0)
+        room_m = outside_m - _radii_m(flight) - obstacle.safe_distance_m
+        found.append(np.where(samples >= history.moving_from[m], room_m, np.inf))
     return found
+
+
+def _to_others(flight: Flight, flies: NDArray[np.bool_]) -> list[FloatArray]:
+    """(T, U) [m] room to each UAS while it flies; none where there is one alone."""
+    at_m, radii_m = flight.x[..., :3], _radii_m(flight)
+    found = []
+    for j in range(len(radii_m) if len(radii_m) > 1 else 0):
+        room_m = _outside(at_m - at_m[:, j, None]) - radii_m - radii_m[j]
+        room_m = room_m - flight.scenario.uas_safe_distance_m
+        found.append(np.where(flies[:, j, None] & (np.arange(len(radii_m)) != j), room_m, np.inf))
+    return found
+
+
+def _to_fence(flight: Flight, history: SceneHistory) -> FloatArray:
+    scenario = history.scenario
+    return -scenario.fence.signed_distance(flight.x[..., :3]) - scenario.geofence.margin_m
+
+
+def _above(flight: Flight, history: SceneHistory) -> list[FloatArray]:
+    """(T, U) [m] room above the least height, beyond take-off and landing; none without one."""
+    if history.scenario.min_height_m <= 0.0:
+        return []
+    away_m = np.linalg.norm(flight.x[..., :2] - history.home_m[..., :2], axis=-1)
+    at_home = away_m <= history.scenario.landing_zone_m
+    return [np.where(at_home, np.inf, _height_room(flight, history))]
 
 
 def floors_m(flight: Flight, history: SceneHistory) -> FloatArray:

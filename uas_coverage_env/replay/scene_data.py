@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from uas_coverage_env.draw import colours
-from uas_coverage_env.flight import SceneHistory
+from uas_coverage_env.draw.marks import heavy_waypoints
+from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.replay.outline import outline_of
+from uas_coverage_env.geometry.outline import outline_of
 
 
 def scene_data(history: SceneHistory) -> dict[str, Any]:
@@ -20,43 +21,19 @@ def scene_data(history: SceneHistory) -> dict[str, Any]:
     What events add has the sample `from` which it is there; what they drop, `until` when.
     """
     scenario = history.scenario
-    never = len(history.moving_position_m)
-    lightest = min(waypoint.weight for waypoint in scenario.waypoints)
     return {
         "name": scenario.name,
         "fence": _body(scenario.fence),
-        "obstacles": [
-            {
-                "name": obstacle.name,
-                "kind": obstacle.kind or "",
-                "colour": hex_colour(colours.of_obstacle(obstacle.kind)),
-                "from": int(since),
-                **_body(hull),
-            }
-            for obstacle, hull, since in zip(
-                scenario.obstacles, scenario.hulls, history.obstacle_from, strict=True
-            )
-        ],
+        "obstacles": _obstacles(history),
         "decorations": [
             {
                 "kind": item.kind or "",
-                "colour": hex_colour(colours.of_decoration(item.kind)),
+                "colour": colours.hex_of(colours.of_decoration(item.kind)),
                 "outline": _metres(np.array(item.polygon_m)),
             }
             for item in scenario.decorations
         ],
-        "waypoints": [
-            {
-                "at": _metres(np.array(waypoint.position_m)),
-                "radius": waypoint.radius_m,
-                "heavy": waypoint.weight > lightest,
-                "from": int(since),
-                "until": int(until) if until < never else None,
-            }
-            for waypoint, since, until in zip(
-                scenario.waypoints, history.waypoint_from, history.waypoint_until, strict=True
-            )
-        ],
+        "waypoints": _waypoints(history),
         "moving": [
             {
                 "name": obstacle.name,
@@ -71,13 +48,49 @@ def scene_data(history: SceneHistory) -> dict[str, Any]:
         "uas": [
             {
                 "name": uas.name,
-                "colour": hex_colour(colours.UAS[i % len(colours.UAS)]),
+                "colour": colours.hex_of(colours.of_uas(i)),
                 "homes": _homes(history, i),
                 "lowest_soc": round(1.0 - uas.dod_max, 4),
             }
             for i, uas in enumerate(scenario.uas)
         ],
     }
+
+
+def _obstacles(history: SceneHistory) -> list[dict[str, Any]]:
+    scenario = history.scenario
+    return [
+        {
+            "name": obstacle.name,
+            "kind": obstacle.kind or "",
+            "colour": colours.hex_of(colours.of_obstacle(obstacle.kind)),
+            "from": int(since),
+            **_body(hull),
+        }
+        for obstacle, hull, since in zip(
+            scenario.obstacles, scenario.hulls, history.obstacle_from, strict=True
+        )
+    ]
+
+
+def _waypoints(history: SceneHistory) -> list[dict[str, Any]]:
+    waypoints, never = history.scenario.waypoints, len(history.moving_position_m)
+    return [
+        {
+            "at": _metres(np.array(waypoint.position_m)),
+            "radius": waypoint.radius_m,
+            "heavy": heavy,
+            "from": int(since),
+            "until": int(until) if until < never else None,
+        }
+        for waypoint, heavy, since, until in zip(
+            waypoints,
+            heavy_waypoints(history.scenario),
+            history.waypoint_from,
+            history.waypoint_until,
+            strict=True,
+        )
+    ]
 
 
 def _homes(history: SceneHistory, i: int) -> list[dict[str, Any]]:
@@ -98,14 +111,9 @@ def _body(hull: ConvexPolytope) -> dict[str, Any]:
     return {
         "corners": _metres(corners),
         "triangles": triangles.tolist(),
-        "outline": _metres(outline_of(hull)),
+        "outline": _metres(outline_of(hull.vertices_m)),
     }
 
 
 def _metres(values: NDArray[np.float64]) -> list[Any]:
     return values.round(2).tolist()
-
-
-def hex_colour(colour: colours.Colour) -> str:
-    """As the page writes it: #rrggbb."""
-    return "#" + "".join(f"{part:02x}" for part in colour)

@@ -10,7 +10,7 @@ import contextlib
 import dataclasses
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from functools import cache
 from pathlib import Path
 from types import TracebackType
@@ -68,7 +68,7 @@ class Store(Generic[Record]):
         try:
             with self._connection:
                 self._connection.execute(
-                    f"{verb} INTO flights ({', '.join(names)}) VALUES ({places})", values
+                    f"{verb} INTO flights ({_listed(names)}) VALUES ({places})", values
                 )
         except sqlite3.IntegrityError as error:
             raise ValueError(f"flight {values[0]} is in {self.path} already: {error}") from error
@@ -79,7 +79,7 @@ class Store(Generic[Record]):
         """All flights, in an order that does not depend on when they were flown."""
         names = list(columns_of(self._record))
         order = ", ".join([*(n for n in ("scenario", "label", "seed") if n in names), "key"])
-        found = self._connection.execute(f"SELECT {', '.join(names)} FROM flights ORDER BY {order}")
+        found = self._connection.execute(f"SELECT {_listed(names)} FROM flights ORDER BY {order}")
         try:
             return [_checked(self._record, values) for values in found]
         except ValueError as error:
@@ -293,8 +293,15 @@ def _schema(record: type) -> str:
     columns = []
     for name, (kind, *optional) in columns_of(record).items():
         null = "" if optional else " NOT NULL"
-        columns.append(f"{name} {_SQL_TYPES[kind]}{null}{'' if columns else ' PRIMARY KEY'}")
+        columns.append(
+            f"{_listed([name])} {_SQL_TYPES[kind]}{null}{'' if columns else ' PRIMARY KEY'}"
+        )
     return ", ".join(columns)
+
+
+def _listed(names: Iterable[str]) -> str:
+    """Names of columns in a query: one may be a word of SQL, too."""
+    return ", ".join(f'"{name}"' for name in names)
 
 
 def _short(value: Any) -> str:

@@ -44,5 +44,5 @@ Events = Annotated[tuple[Event, ...], Strict(False), Field(max_length=1000)]
 
 # a kind is found in its own file, and imported from here
 globals().update({kind.__name__: kind for kind in EVENT_KINDS})
-__all__ = ["EVENT_KINDS", "Event", "Events"]
+__all__ = ["EVENT_KINDS"]
 __all__ += [kind.__name__ for kind in EVENT_KINDS]

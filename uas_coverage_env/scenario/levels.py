@@ -18,7 +18,7 @@ ROUGHNESS_M = 0.05
 
 
 @dataclass(frozen=True)
-class Level:
+class DisturbanceLevel:
     """What a level draws from.
 
     Attributes:
@@ -35,8 +35,8 @@ class Level:
     turbulence: float = 1.0
 
 
-LEVELS: Mapping[str, Level] = {
-    "light": Level(
+DISTURBANCE_LEVELS: Mapping[str, DisturbanceLevel] = {
+    "light": DisturbanceLevel(
         mean_mps=(1.0, 4.0),
         gusts=RandomGusts(per_min=0.5, peak_mps=1.5, lasts_s=6.0),
         uncertainty=Uncertainty(
@@ -44,7 +44,7 @@ LEVELS: Mapping[str, Level] = {
             capacity_lost=0.05, resistance_gained=0.2,
         ),
     ),
-    "moderate": Level(
+    "moderate": DisturbanceLevel(
         mean_mps=(4.0, 7.0),
         gusts=RandomGusts(per_min=0.5, peak_mps=2.5, lasts_s=6.0),
         uncertainty=Uncertainty(
@@ -52,7 +52,7 @@ LEVELS: Mapping[str, Level] = {
             capacity_lost=0.10, resistance_gained=0.4,
         ),
     ),
-    "strong": Level(
+    "strong": DisturbanceLevel(
         mean_mps=(7.0, 10.0),
         gusts=RandomGusts(per_min=1.0, peak_mps=4.0, lasts_s=6.0),
         uncertainty=Uncertainty(
@@ -70,8 +70,10 @@ def check_level(level: Any) -> None:
     Raises:
         ValueError: It is.
     """
-    if level is not None and (not isinstance(level, str) or level not in LEVELS):
-        raise ValueError(f"disturbances is {level!r}; it should be {', '.join(LEVELS)} or None")
+    if level is not None and (not isinstance(level, str) or level not in DISTURBANCE_LEVELS):
+        raise ValueError(
+            f"disturbances is {level!r}; it should be {', '.join(DISTURBANCE_LEVELS)} or None"
+        )
 
 
 def with_disturbances(scenario: Scenario, level: str | None, seed: int) -> Scenario:
@@ -91,7 +93,7 @@ def with_disturbances(scenario: Scenario, level: str | None, seed: int) -> Scena
     check_level(level)
     if level is None:
         return scenario
-    numbers = LEVELS[level]
+    numbers = DISTURBANCE_LEVELS[level]
     rng = np.random.default_rng([seed, *level.encode()])
     wind = Wind(
         mean_mps=round(float(rng.uniform(*numbers.mean_mps)), 2),

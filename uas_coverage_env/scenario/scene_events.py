@@ -7,7 +7,7 @@ from pydantic import Field
 
 from uas_coverage_env.compiled.kernels import rare_kernel
 from uas_coverage_env.features.event import EventTable, OfUas, happens
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.scenario.fields import (
     Distance_m,
     Length_m,
@@ -44,7 +44,7 @@ class WaypointDropped(EventTable):
         waypoint: Its place among the waypoints, from 0 on.
     """
 
-    feature: ClassVar = Feature("waypoint_dropped", {Point.MOVED: _drop})
+    feature: ClassVar = MissionFeature("waypoint_dropped", {Point.MOVED: _drop})
 
     kind: Literal["waypoint_dropped"]
     waypoint: Annotated[int, Field(ge=0, le=10**6)]

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.files.strict_toml import InputError, parse
-from uas_coverage_env.scenario.families import Family, FamilyOfSeeds, installed_families
+from uas_coverage_env.scenario.families import Family, installed_families
+from uas_coverage_env.scenario.families.family import FamilyOfSeeds
 from uas_coverage_env.scenario.families.generated import GeneratedScenarios
 from uas_coverage_env.scenario.load import is_path, load_scenario, scenario_names
 from uas_coverage_env.scenario.model import Scenario

@@ -15,7 +15,7 @@ from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rare_kernel, rarely
 from uas_coverage_env.entities.commands import WRENCH
 from uas_coverage_env.entities.state import FLYING, as_estimated
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.simulation.points import (
     ACT,
     AT_BEGIN,
@@ -27,22 +27,12 @@ from uas_coverage_env.simulation.points import (
     call_features,
     fly_at,
 )
-from uas_coverage_env.vehicle import (
-    DOD,
-    LIFT,
-    TAU_Z,
-    U_TH,
-    clip_wrench,
-    enter_air,
-    face_course,
-    leave_air,
-    lpv_step,
-    open_circuit_V,
-    plant_step,
-    push,
-    reseed_reference,
-)
-from uas_coverage_env.vehicle.discharge import discharge_further
+from uas_coverage_env.vehicle import lpv_step, plant_step
+from uas_coverage_env.vehicle.air import enter_air, leave_air, push
+from uas_coverage_env.vehicle.discharge import discharge_further, open_circuit_V
+from uas_coverage_env.vehicle.inner_loop import face_course, reseed_reference
+from uas_coverage_env.vehicle.layout import DOD, LIFT, TAU_Z, U_TH
+from uas_coverage_env.vehicle.lpv import clip_wrench
 
 
 @inlined_kernel
@@ -225,7 +215,7 @@ def move_all(arena, state, nonlinear, outcome):
         _note(arena, state, i, event, voltage_V, current_A)
 
 
-def feature_code(features: Sequence[Feature], *, otherwise: bool = False) -> FeatureCode:
+def feature_code(features: Sequence[MissionFeature], *, otherwise: bool = False) -> FeatureCode:
     """Compile the kernels of features, or load them from the cache.
 
     Args:

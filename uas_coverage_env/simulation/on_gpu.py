@@ -6,10 +6,10 @@ from typing import Any
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.compiled.random import counted
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 
 
-def called_at(point: Point, features: Sequence[Feature]) -> Any:
+def called_at(point: Point, features: Sequence[MissionFeature]) -> Any:
     """A compiled function that calls the kernels of features at a point, in their order.
 
     Args:
@@ -22,12 +22,12 @@ def called_at(point: Point, features: Sequence[Feature]) -> Any:
     return _chain(_kernels(point, features))
 
 
-def called_at_begin(features: Sequence[Feature]) -> Any:
+def called_at_begin(features: Sequence[MissionFeature]) -> Any:
     """Likewise where a mission begins: (arena, state, seed, mission) -> None."""
     return _chain_at_begin(_kernels(Point.BEGIN, features))
 
 
-def _kernels(point: Point, features: Sequence[Feature]) -> tuple[tuple[int, Any], ...]:
+def _kernels(point: Point, features: Sequence[MissionFeature]) -> tuple[tuple[int, Any], ...]:
     each = ((f, feature.kernels.get(point)) for f, feature in enumerate(features))
     return tuple((f, own) for f, own in each if own is not None)
 

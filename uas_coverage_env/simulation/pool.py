@@ -10,7 +10,7 @@ from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.views import lane_view, pool_view
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import FLYING, STATE, WorldState
-from uas_coverage_env.features.feature import Feature
+from uas_coverage_env.features.feature import MissionFeature
 from uas_coverage_env.features.of_scenario import disturbances_of
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.step import begin_mission
@@ -32,7 +32,7 @@ def pool_worlds(
     scenarios: Sequence[Scenario],
     *,
     measured_m: float = math.inf,
-    slots: Sequence[Sequence[Feature | None]] | None = None,
+    slots: Sequence[Sequence[MissionFeature | None]] | None = None,
     judges_wrenches: bool = False,
 ) -> WorldPool:
     """Arenas and starts of scenarios with any numbers of UAS, waypoints and obstacles.

@@ -17,7 +17,7 @@ from uas_coverage_env.simulation.points import (
     begin_features,
     call_features,
 )
-from uas_coverage_env.vehicle import N_INPUTS, X
+from uas_coverage_env.vehicle.layout import N_INPUTS, X
 from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.contacts import (
     check_fence_and_battery,

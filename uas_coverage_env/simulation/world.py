@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import (
@@ -20,7 +21,7 @@ from uas_coverage_env.entities.state import (
     SwarmState,
     WorldState,
 )
-from uas_coverage_env.features.feature import Feature, memory_words
+from uas_coverage_env.features.feature import MissionFeature, memory_words
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import take_off
 from uas_coverage_env.simulation.flight import feature_code
@@ -38,8 +39,8 @@ from uas_coverage_env.simulation.step import (
     begin_mission,
     step_world,
 )
-from uas_coverage_env.vehicle import DOD, PSI, U_TH, WZ
 from uas_coverage_env.vehicle.battery import BatteryState
+from uas_coverage_env.vehicle.layout import DOD, PSI, U_TH, WZ
 from uas_coverage_env.world.arena import Arena, build_arena
 from uas_coverage_env.world.events import goes_home
 from uas_coverage_env.world.packs import (
@@ -50,14 +51,13 @@ from uas_coverage_env.world.packs import (
 )
 from uas_coverage_env.world.sensing import senses
 
-Dynamics = Literal["lpv", "nonlinear"]
 StepCode = Callable[..., int]
 
 _OUTCOMES_IN_BLOCK = 256
 
 
 def initial_state(
-    scenario: Scenario, arena: Arena | None = None, features: Sequence[Feature | None] = ()
+    scenario: Scenario, arena: Arena | None = None, features: Sequence[MissionFeature | None] = ()
 ) -> WorldState:
     """All UAS at rest at their starts, nothing covered; batteries rested, or after take-off.
 
@@ -156,16 +156,16 @@ class World:
         self,
         scenario: Scenario,
         *,
-        dynamics: Dynamics = "lpv",
+        dynamics: DynamicsName = "lpv",
         return_mode: bool = False,
         safety_filter: bool = False,
         measured_m: float = math.inf,
-        disturbances: Sequence[Feature] | None = None,
+        disturbances: Sequence[MissionFeature] | None = None,
         judges_wrenches: bool = False,
         seed: int = 0,
     ) -> None:
-        if dynamics not in get_args(Dynamics):
-            allowed = ", ".join(get_args(Dynamics))
+        if dynamics not in get_args(DynamicsName):
+            allowed = ", ".join(get_args(DynamicsName))
             raise ValueError(f"dynamics is {dynamics!r}; it is one of {allowed}")
         self.scenario = scenario
         self.dynamics = dynamics
@@ -371,12 +371,7 @@ class World:
     @property
     def visits_to_come(self) -> int:
         """How often waypoints are still to be covered, now and when they are asked for again."""
-        state = self.state
-        later = 0
-        for w, due_step in enumerate(state.due_step):
-            if state.uncovered[w] or due_step > state.step[0]:
-                later += len(self.known.waypoints[w].again_after_s)
-        return int(state.uncovered.sum()) + later
+        return visits_to_come(self.known, self.state)
 
     @property
     def time_s(self) -> float:
@@ -386,3 +381,17 @@ class World:
     def swarm_state(self) -> SwarmState:
         """What planners see now, in arrays of their own."""
         return swarm_state(self.known, self.arena, self.state)
+
+
+def visits_to_come(known: Scenario, state: WorldState) -> int:
+    """How often waypoints are still to be covered, now and when they are asked for again.
+
+    Args:
+        known: The scenario as it is now.
+        state: The state of its mission.
+    """
+    later = 0
+    for w, due_step in enumerate(state.due_step):
+        if state.uncovered[w] or due_step > state.step[0]:
+            later += len(known.waypoints[w].again_after_s)
+    return int(state.uncovered.sum()) + later

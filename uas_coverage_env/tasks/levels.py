@@ -46,7 +46,7 @@ LEVELS: Mapping[str, Task] = {
             return_mode=True,
             safety_filter=True,
             action="waypoint",
-            max_cycles=150,
+            max_steps=150,
         ),
         Task(
             level="medium",

@@ -40,7 +40,7 @@ class Task:
         return_mode: Whether the world brings UAS home in time.
         safety_filter: Whether the world keeps commands clear of harm.
         action: Kind of action that the environment has unless a learner wants another one.
-        max_cycles: Time limit [steps]; None: that of each scenario.
+        max_steps: Time limit [steps]; None: that of each scenario.
         disturbances: Level of wind and wrong models; None: still air.
         faults: What goes wrong in a mission: (rng, scenario) -> the scenario with its events.
         reward_weights: Weights that are not the default ones.
@@ -52,7 +52,7 @@ class Task:
     return_mode: bool
     safety_filter: bool
     action: str = "velocity"
-    max_cycles: int | None = None
+    max_steps: int | None = None
     disturbances: str | None = None
     faults: Callable[[Rng, Scenario], Scenario] | None = None
     reward_weights: Mapping[str, float] = field(default_factory=dict)
@@ -114,7 +114,7 @@ class Task:
             "action": self.action,
             "return_mode": self.return_mode,
             "safety_filter": self.safety_filter,
-            "max_cycles": self.max_cycles,
+            "max_cycles": self.max_steps,
         }
         if "reward" not in chosen:
             given["reward_weights"] = dict(self.reward_weights)

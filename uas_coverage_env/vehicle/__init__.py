@@ -1,168 +1,32 @@
 """The vehicle: parameters, energy-aware LPV model, inner loop and nonlinear plant (Sec. II)."""
 
-from uas_coverage_env.vehicle.air import enter_air, leave_air, push
-from uas_coverage_env.vehicle.attitude import body_attitude, tilts_and_turn
-from uas_coverage_env.vehicle.battery import (
-    battery_current_A,
-    battery_segments,
-    open_circuit_voltage,
-    simulate_battery,
-)
+from uas_coverage_env.vehicle.battery import open_circuit_voltage, simulate_battery
 from uas_coverage_env.vehicle.data_sheet import DataSheet
-from uas_coverage_env.vehicle.discharge import open_circuit_V
-from uas_coverage_env.vehicle.flight_time import Endurance, endurance, flight_time_s
-from uas_coverage_env.vehicle.inner_loop import (
-    COURSE_SPEED_MPS,
-    acceleration_wrench,
-    face_course,
-    reseed_reference,
-    velocity_climb_wrench,
-    velocity_wrench,
-    within_half_turn,
-)
-from uas_coverage_env.vehicle.layout import (
-    DELTA_THRUST,
-    DOD,
-    LIFT,
-    N_INPUTS,
-    N_STATES,
-    PHI,
-    PSI,
-    TAU_X,
-    TAU_Y,
-    TAU_Z,
-    THETA,
-    U_TH,
-    VX,
-    VY,
-    VZ,
-    WX,
-    WY,
-    WZ,
-    X,
-    Y,
-    Z,
-)
-from uas_coverage_env.vehicle.limits import (
-    LIMIT_NAMES,
-    LIMITS,
-    LOST_BEYOND,
-    N_LIMITS,
-    is_out_of_control,
-    limit_names,
-    limits_exceeded,
-    write_limited,
-)
+from uas_coverage_env.vehicle.flight_time import Endurance, endurance
 from uas_coverage_env.vehicle.linear import LinearModel, linear_model
-from uas_coverage_env.vehicle.lpv import (
-    clip_wrench,
-    delta_thrust,
-    fly_kinematics,
-    lpv_step,
-)
-from uas_coverage_env.vehicle.params import (
-    VehicleParams,
-    load_vehicle,
-    return_threshold,
-    vehicle_names,
-)
-from uas_coverage_env.vehicle.parts import RcPair
+from uas_coverage_env.vehicle.lpv import delta_thrust, lpv_step
+from uas_coverage_env.vehicle.params import VehicleParams, load_vehicle, vehicle_names
 from uas_coverage_env.vehicle.plant import plant_step
-from uas_coverage_env.vehicle.range import dod_per_s, margin_to_land, seconds_to_land
-from uas_coverage_env.vehicle.record import VEHICLE_DTYPE, compile_vehicle
+from uas_coverage_env.vehicle.record import compile_vehicle
 from uas_coverage_env.vehicle.sizing import MadeVehicle, make_vehicle
-from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust, fit_thrust_correction
-from uas_coverage_env.vehicle.true_vehicle import (
-    CAPACITY,
-    DRAG,
-    MASS,
-    N_PERTURBATIONS,
-    PERTURBATIONS,
-    POWER,
-    RESISTANCE,
-    THRUST,
-    write_true_vehicle,
-)
+from uas_coverage_env.vehicle.thrust_correction import exact_delta_thrust
 
 __all__ = [
-    "CAPACITY",
-    "COURSE_SPEED_MPS",
-    "DELTA_THRUST",
-    "DOD",
-    "DRAG",
-    "LIFT",
-    "LIMITS",
-    "LIMIT_NAMES",
-    "LOST_BEYOND",
-    "MASS",
-    "N_INPUTS",
-    "N_LIMITS",
-    "N_PERTURBATIONS",
-    "N_STATES",
-    "PERTURBATIONS",
-    "PHI",
-    "POWER",
-    "PSI",
-    "RESISTANCE",
-    "TAU_X",
-    "TAU_Y",
-    "TAU_Z",
-    "THETA",
-    "THRUST",
-    "U_TH",
-    "VEHICLE_DTYPE",
-    "VX",
-    "VY",
-    "VZ",
-    "WX",
-    "WY",
-    "WZ",
     "DataSheet",
     "Endurance",
     "LinearModel",
     "MadeVehicle",
-    "RcPair",
     "VehicleParams",
-    "X",
-    "Y",
-    "Z",
-    "acceleration_wrench",
-    "battery_current_A",
-    "battery_segments",
-    "body_attitude",
-    "clip_wrench",
     "compile_vehicle",
     "delta_thrust",
-    "dod_per_s",
     "endurance",
-    "enter_air",
     "exact_delta_thrust",
-    "face_course",
-    "fit_thrust_correction",
-    "flight_time_s",
-    "fly_kinematics",
-    "is_out_of_control",
-    "leave_air",
-    "limit_names",
-    "limits_exceeded",
     "linear_model",
     "load_vehicle",
     "lpv_step",
     "make_vehicle",
-    "margin_to_land",
-    "open_circuit_V",
     "open_circuit_voltage",
     "plant_step",
-    "push",
-    "reseed_reference",
-    "return_threshold",
-    "seconds_to_land",
     "simulate_battery",
-    "tilts_and_turn",
     "vehicle_names",
-    "velocity_climb_wrench",
-    "velocity_wrench",
-    "within_half_turn",
-    "write_limited",
-    "write_true_vehicle",
 ]

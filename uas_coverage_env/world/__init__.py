@@ -1,81 +1,21 @@
 """A mission as it stands: arena, state and commands, contacts and coverage (`docs/rules.md`)."""
 
 from uas_coverage_env.entities.codes import CommandKind, ContactKind, UasStatus
-from uas_coverage_env.entities.commands import (
-    ACCELERATION,
-    CLIMB,
-    COMMAND_DTYPE,
-    GO_TO,
-    HOME,
-    KIND_NAMES,
-    VELOCITY,
-    WRENCH,
-    Acceleration,
-    Command,
-    GoTo,
-    Mode,
-    Velocity,
-    Wrench,
-    command_mode,
-    pack,
-)
-from uas_coverage_env.entities.outcome import CONTACT_NAMES, OUTCOME_DTYPE
-from uas_coverage_env.entities.state import (
-    ABSENT,
-    CONSUMPTION,
-    FLYING,
-    LANDED,
-    LOST,
-    N_BELIEF,
-    SINK,
-    STATUS_NAMES,
-    SWAPPING,
-    WIND,
-    SwarmState,
-    WorldState,
-)
+from uas_coverage_env.entities.commands import Acceleration, Command, GoTo, Velocity, Wrench
+from uas_coverage_env.entities.state import SwarmState, WorldState
 from uas_coverage_env.world.arena import Arena, build_arena
-from uas_coverage_env.world.routes import CLEAR, IN_SIGHT, NO_WAY, crossing, route
 
 __all__ = [
-    "ABSENT",
-    "ACCELERATION",
-    "CLEAR",
-    "CLIMB",
-    "COMMAND_DTYPE",
-    "CONSUMPTION",
-    "CONTACT_NAMES",
-    "FLYING",
-    "GO_TO",
-    "HOME",
-    "IN_SIGHT",
-    "KIND_NAMES",
-    "LANDED",
-    "LOST",
-    "NO_WAY",
-    "N_BELIEF",
-    "OUTCOME_DTYPE",
-    "SINK",
-    "STATUS_NAMES",
-    "SWAPPING",
-    "VELOCITY",
-    "WIND",
-    "WRENCH",
     "Acceleration",
     "Arena",
     "Command",
     "CommandKind",
     "ContactKind",
     "GoTo",
-    "Mode",
     "SwarmState",
     "UasStatus",
     "Velocity",
     "WorldState",
     "Wrench",
     "build_arena",
-    "command_mode",
-    "crossing",
-    "pack",
-    "route",
 ]

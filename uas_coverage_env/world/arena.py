@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.memory import Memory, record_dtype
 from uas_coverage_env.entities.commands import CLIMB, COMMAND_DTYPE
-from uas_coverage_env.features.feature import FEATURE_DTYPE, Feature, feature_tables
+from uas_coverage_env.features.feature import FEATURE_DTYPE, MissionFeature, feature_tables
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import compile_vehicle, dod_per_s
+from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
 from uas_coverage_env.vehicle.stopping import stopping_of
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
@@ -165,7 +166,7 @@ def build_arena(
     scenario: Scenario,
     *,
     measured_m: float = math.inf,
-    features: Sequence[Feature | None] = (),
+    features: Sequence[MissionFeature | None] = (),
     judges_wrenches: bool = False,
 ) -> Arena:
     """The scenario as arrays.
@@ -247,7 +248,7 @@ def _vehicles(scenario: Scenario) -> NDArray[np.void]:
     return records
 
 
-def has_true_vehicles(scenario: Scenario, features: Sequence[Feature | None]) -> bool:
+def has_true_vehicles(scenario: Scenario, features: Sequence[MissionFeature | None]) -> bool:
     """Whether vehicles may differ from their files, or batteries have a memory beside x."""
     perturbed = any(each is not None and each.perturbs for each in features)
     return perturbed or any(vehicle.battery.rc for vehicle in scenario.vehicles)

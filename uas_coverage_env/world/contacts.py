@@ -16,14 +16,15 @@ from uas_coverage_env.entities.outcome import (
     UAS,
 )
 from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.geometry import (
+from uas_coverage_env.geometry.segments import (
     cylinder_clearance,
     cylinder_gap,
     outside_cylinder,
     segment_clearance,
     signed_distance,
 )
-from uas_coverage_env.vehicle import DOD, X, Y, Z, is_out_of_control, limits_exceeded
+from uas_coverage_env.vehicle.layout import DOD, X, Y, Z
+from uas_coverage_env.vehicle.limits import is_out_of_control, limits_exceeded
 from uas_coverage_env.world.broad_phase import (
     BLOCK,
     EPS_M,

@@ -9,7 +9,7 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
 from uas_coverage_env.entities.outcome import NONE
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import DOD, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle.layout import DOD, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, REACH_M2, WEIGHT
 
 

@@ -16,7 +16,7 @@ from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.compiled.random import counted, uniform
 from uas_coverage_env.entities.state import EVERY, NEVER
 from uas_coverage_env.features.event import OfUas
-from uas_coverage_env.features.feature import Feature
+from uas_coverage_env.features.feature import MissionFeature
 from uas_coverage_env.scenario import Scenario
 
 BY_LOT = -1
@@ -40,7 +40,9 @@ EVENT_DTYPE = record_dtype(
 )
 
 
-def event_records(scenario: Scenario, features: Sequence[Feature | None]) -> NDArray[np.void]:
+def event_records(
+    scenario: Scenario, features: Sequence[MissionFeature | None]
+) -> NDArray[np.void]:
     """(E,) of EVENT_DTYPE, the events of a scenario in their order.
 
     Args:

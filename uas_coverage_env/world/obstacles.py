@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from uas_coverage_env.compiled.memory import record_dtype
-from uas_coverage_env.geometry import ConvexPolytope, corners_of
+from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry.polytope import corners_of
 from uas_coverage_env.scenario import NoFlyZone, Scenario
 from uas_coverage_env.world.broad_phase import EPS_M
 from uas_coverage_env.world.overhangs import overhangs

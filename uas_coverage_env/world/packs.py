@@ -15,12 +15,12 @@ from uas_coverage_env.entities.state import (
     NEVER,
     SWAPPING,
 )
-from uas_coverage_env.features.feature import Feature, Point
+from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.features.of_scenario import features_of
-from uas_coverage_env.geometry import cylinder_clearance, outside_cylinder
+from uas_coverage_env.geometry.segments import cylinder_clearance, outside_cylinder
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.ground_phases import landing, take_off
-from uas_coverage_env.vehicle import DOD, U_TH, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle.layout import DOD, U_TH, VX, VY, VZ, X, Y, Z
 from uas_coverage_env.vehicle.parts import MAX_FURTHER_PAIRS
 from uas_coverage_env.world.contacts import obstacle_breaches
 from uas_coverage_env.world.coverage import can_cover
@@ -251,13 +251,13 @@ def _swap_packs(arena, state, outcome, f):
                 _end(state, i, outcome)
 
 
-PACKS = Feature("packs", {Point.JUDGED: _swap_packs})
+PACKS = MissionFeature("packs", {Point.JUDGED: _swap_packs})
 """Swaps of each UAS on its own."""
 
 
 def mission_features(
-    scenario: Scenario, disturbances: Sequence[Feature] | None = None
-) -> tuple[Feature, ...]:
+    scenario: Scenario, disturbances: Sequence[MissionFeature] | None = None
+) -> tuple[MissionFeature, ...]:
     """What a mission has of what few missions have.
 
     Args:

@@ -1,7 +1,7 @@
 """Where a UAS may be: inside the fence, and as far from the fixed obstacles as commands keep."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.world.routes import CREEP_M, box_apart
 
 _ROUTES_INSIDE_M = 0.5

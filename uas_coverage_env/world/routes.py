@@ -7,7 +7,7 @@ a visibility graph (`corners.py`).
 import math
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
-from uas_coverage_env.geometry import segment_meets, signed_distance
+from uas_coverage_env.geometry.segments import segment_meets, signed_distance
 from uas_coverage_env.world.broad_phase import BLOCK, BOX, write_meetings
 
 CREEP_M = 1e-3

@@ -1,9 +1,11 @@
 // The curves beside a flight. Two flights share their ranges, so that they can be compared.
 
 import { Chart, DASHES, type ChartContent, type Line, type TimeCanvas } from "./chart";
-import type { Flight, Series } from "./flight";
+import type { Flight } from "./flight";
+import type { Series } from "./flight_data";
 import { shortName } from "./marks";
 import { ModeChart } from "./mode_chart";
+import { colour } from "./palette";
 
 const FEW = 4;
 
@@ -69,12 +71,13 @@ function charge(flight: Flight, focused: number | null): ChartContent {
   };
 }
 
+/** [words, custom property of the style, dashes] */
 const ROOMS: Record<string, [string, string, number[]]> = {
-  obstacles: ["obstacles", "#8c564b", []],
-  moving: ["moving", "#c81e2d", [6, 3]],
-  others: ["UAS", "#0072b2", [2, 3]],
-  fence: ["fence", "#7f7f7f", [9, 3, 2, 3]],
-  height: ["height", "#b8860b", [4, 2]],
+  obstacles: ["obstacles", "--near-obstacles", []],
+  moving: ["moving", "--near-moving", [6, 3]],
+  others: ["UAS", "--near-others", [2, 3]],
+  fence: ["fence", "--near-fence", [9, 3, 2, 3]],
+  height: ["height", "--near-height", [4, 2]],
 };
 const NEAR_M = 20;
 
@@ -86,14 +89,14 @@ function room(flight: Flight, focused: number | null): ChartContent {
     title: "Room, m",
     lines: kinds.map(([kind, { values: whole, unit }]) => ({
       label: "",
-      colour: ROOMS[kind][1],
+      colour: colour(ROOMS[kind][1]),
       values: Array.from(
         { length: Math.max(...uas.map((i) => flight.data.last[i])) + 1 },
         (_, k) => Math.min(...uas.map((i) => whole[k * flight.uas + i] * unit)),
       ),
       dash: ROOMS[kind][2],
     })),
-    legend: kinds.map(([kind]) => [ROOMS[kind][0], ROOMS[kind][1]]),
+    legend: kinds.map(([kind]) => [ROOMS[kind][0], colour(ROOMS[kind][1])]),
     dt: flight.data.dt_s,
     show: (value) => (value >= NEAR_M ? "far" : value.toFixed(1)),
     from: -1,
@@ -126,7 +129,7 @@ function coverage(flight: Flight): ChartContent {
   const count = flight.askedFor(flight.data.samples - 1);
   return {
     title: "Waypoints covered",
-    lines: [{ label: "", colour: "#009e73", values: flight.data.covered, dash: [] }],
+    lines: [{ label: "", colour: colour("--progress"), values: flight.data.covered, dash: [] }],
     dt: flight.data.dt_s,
     show: (value) => `${value} of ${count}`,
     from: 0,
@@ -162,7 +165,7 @@ function decisionTime(flight: Flight, unit: string, scale: number, longest_s: nu
   return {
     title: `Decision time, ${unit}${fallbacks.length > 0 ? ` (■ fallbacks: ${fallbacks.length})` : ""}`,
     lines: [
-      { label: "", colour: "#aa4b8c", values: whole.map((value) => value * step * scale), dash: [] },
+      { label: "", colour: colour("--effort"), values: whole.map((value) => value * step * scale), dash: [] },
     ],
     dt: flight.data.dt_s,
     show: (value) => `${value.toFixed(2)} ${unit}`,

@@ -1,9 +1,8 @@
 // Many UAS in a few words: least and median charge, how many do what; and which of them to show.
 
 import { element } from "./dom";
-import type { Flight, Moment, VehicleMoment } from "./flight";
+import { type Flight, LITTLE_SPARE, type Moment, type VehicleMoment } from "./flight";
 import { shortName } from "./marks";
-import { LITTLE_SPARE } from "./palette";
 
 const LITTLE = "little to spare";
 

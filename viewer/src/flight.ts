@@ -1,136 +1,7 @@
-// A flight as the page holds it (uas_coverage_env/replay/flight_data.py writes it), and what is
-// to be seen at a moment of it. Frame: NED in metres; angles in radians.
+// What is to be seen of a flight at a moment of it.
 
+import type { FlightData, Home, Mark, Point3, Scene, Series, Violation } from "./flight_data";
 import { reachable } from "./reach";
-
-export type Point2 = [number, number];
-export type Point3 = [number, number, number];
-
-export interface Series {
-  unit: number;
-  values: number[];
-}
-
-export interface Body {
-  corners: Point3[];
-  triangles: Point3[];
-  outline: Point2[];
-}
-
-export interface Obstacle extends Body {
-  name: string;
-  kind: string;
-  colour: string;
-  /** Sample from which it stands: events add some. */
-  from: number;
-}
-
-/** Where a UAS is to land, from a sample on. */
-export interface Home {
-  from: number;
-  at: Point3;
-}
-
-export interface Scene {
-  name: string;
-  fence: Body;
-  obstacles: Obstacle[];
-  decorations: { kind: string; colour: string; outline: Point2[] }[];
-  /** To be covered from a sample on; `until` when it was dropped, if it was. */
-  waypoints: { at: Point3; radius: number; heavy: boolean; from: number; until: number | null }[];
-  moving: { name: string; kind: string; radius: number; height: number; safe: number; from: number }[];
-  uas: { name: string; colour: string; homes: Home[]; lowest_soc: number }[];
-}
-
-export interface Violation {
-  t_s: number;
-  uas: string;
-  kind: string;
-  with: string | null;
-  value?: number;
-  limit?: number;
-}
-
-/** What happened, and why; it may last. Violations are apart. */
-export interface Mark {
-  t_s: number;
-  until_s: number;
-  kind: string;
-  uas: string | null;
-  text: string;
-}
-
-/** What reaching a place and coming home from it takes (reach_data.py), on a grid. */
-export interface ReachData {
-  /** Sample from which it holds: until obstacles or homes are others. */
-  from: number;
-  /** Low end [m], step [m], count. */
-  north: [number, number, number];
-  east: [number, number, number];
-  /** Above the origin [m]. */
-  height: number;
-  /** Charge below which coming home is not sure: axes UAS, north, east. */
-  needed: Series;
-  /** Charge of a metre of flight there, and of slowing down, by UAS. */
-  per_m: number[];
-  fixed: number[];
-}
-
-/** What a kind of camera has seen: the pictures that showed new ground, in order of time. */
-export interface SeenData {
-  sensor: string;
-  colour: string;
-  sample: number[];
-  /** North, east of four corners each. */
-  corners: Series;
-  /** Of the ground to be seen, at each sample. */
-  share: Series;
-}
-
-export interface FlightData {
-  planner: string;
-  seed: number;
-  dynamics: string;
-  dt_s: number;
-  samples: number;
-  scene: Scene;
-  position: Series;
-  attitude: Series;
-  soc: Series;
-  /** Charge below which coming home is not sure. */
-  needed: Series;
-  /** Altitude of the roof, or the ground, under each UAS. */
-  floor: Series;
-  reach: ReachData[];
-  seen: SeenData[];
-  /** Room beyond the safe distances by kind of what is near. */
-  room: Record<string, Series>;
-  min_height_m: number;
-  /** Sample of the point of no return of each UAS, where it was passed. */
-  no_return: (number | null)[];
-  /** Of each UAS the sample with the least charge beyond the way home, and that charge. */
-  least_spare: [number, number][];
-  marks: Mark[];
-  voltage: Series;
-  current: Series;
-  moving: Series;
-  duration: Series;
-  modes: string[];
-  mode: number[];
-  last: number[];
-  covered: number[];
-  covered_at: number[];
-  fallbacks: number[];
-  plan: { unit: number; steps: number[][][] };
-  violations: Violation[];
-  summary: {
-    coverage: number;
-    steps: number;
-    energy_Wh: number;
-    all_home: boolean;
-    breaches: number;
-  };
-}
 
 export interface VehicleMoment {
   position: Point3;
@@ -153,11 +24,10 @@ export interface Moment {
 
 /** So many UAS are each shown in full on the map, without being followed. */
 export const FEW = 8;
-const LITTLE_SPARE = 0.1;
+/** Charge beyond the way home below which it is said to be little. */
+export const LITTLE_SPARE = 0.1;
 
 export class Flight {
-  private energies: number[] = [];
-
   constructor(public data: FlightData) {}
 
   get scene(): Scene {
@@ -175,7 +45,6 @@ export class Flight {
   /** It has gone on. */
   renew(data: FlightData): void {
     this.data = data;
-    this.energies = [];
   }
 
   /** Whether the planner said what it predicted. */
@@ -210,21 +79,19 @@ export class Flight {
 
   /** Energy that the swarm has taken until a time [Wh]. */
   energy(time: number): number {
-    const { voltage, current, dt_s } = this.data;
-    if (this.energies.length === 0) {
-      let sum = 0;
-      for (let k = 0; k < this.data.samples; k++) {
-        this.energies.push(sum);
-        for (let i = 0; i < this.uas; i++) {
-          const n = k * this.uas + i;
-          sum += voltage.values[n] * voltage.unit * current.values[n] * current.unit * (dt_s / 3600);
-        }
-      }
-    }
     const { time: at, sample } = this.moment(time);
     const next = Math.min(sample + 1, this.data.samples - 1);
-    const part = at / dt_s - sample;
-    return this.energies[sample] + part * (this.energies[next] - this.energies[sample]);
+    const part = at / this.data.dt_s - sample;
+    return this.scene.uas.reduce((sum, _, i) => {
+      const [before, after] = [sample, next].map((k) => this.energyOf(k, i));
+      return sum + before + part * (after - before);
+    }, 0);
+  }
+
+  /** Energy that a UAS has taken until a sample [Wh]. */
+  energyOf(sample: number, i: number): number {
+    const { values, unit } = this.data.energy;
+    return values[sample * this.uas + i] * unit;
   }
 
   position(sample: number, i: number): Point3 {
@@ -241,7 +108,8 @@ export class Flight {
   }
 
   mode(sample: number, i: number): string {
-    return this.data.modes[this.data.mode[sample * this.uas + i]];
+    const run = this.data.mode_runs[i].filter(([, first]) => first <= sample).at(-1)!;
+    return this.data.modes[run[0]];
   }
 
   /** Positions that the planner predicted at a sample, x, y, z, x, y, z, ...; often none. */

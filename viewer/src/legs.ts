@@ -61,14 +61,13 @@ export function waypointWords(flight: Flight, w: number, by: (number | null)[]):
 
 /** A leg in words: when, how far, how high and fast, and the energy it took. */
 export function legWords(flight: Flight, { uas: i, from, to, waypoint }: Leg): string {
-  const { voltage, current, dt_s } = flight.data;
-  let [way, energy] = [0, 0];
+  const { dt_s } = flight.data;
+  const energy = flight.energyOf(to, i) - flight.energyOf(from, i);
+  let way = 0;
   const heights = [];
   for (let k = from; k < to; k++) {
     const [a, b] = [flight.position(k, i), flight.position(k + 1, i)];
     way += Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
-    const n = k * flight.uas + i;
-    energy += voltage.values[n] * voltage.unit * current.values[n] * current.unit * (dt_s / 3600);
     heights.push(-a[2], -b[2]);
   }
   const [low, high] = [Math.min(...heights), Math.max(...heights)];

@@ -1,6 +1,6 @@
 // A flight that is still flown: asks the server that gave the page what is new, until it ends.
 
-import type { FlightData } from "./flight";
+import type { FlightData } from "./flight_data";
 
 const PAUSE_MS = 500;
 

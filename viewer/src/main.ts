@@ -1,6 +1,6 @@
 // Reads the flights that the page was written with, shows them, and takes others that are opened.
 
-import type { FlightData } from "./flight";
+import type { FlightData } from "./flight_data";
 import { followLive } from "./live";
 import { Opener } from "./opened";
 import { Page } from "./page";

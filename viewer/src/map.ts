@@ -1,7 +1,9 @@
 // The map of one flight on a plain canvas: north up. It is drawn where there is no WebGL, and on
 // request.
 
-import { type Flight, homeAt, type Moment, type Point2, type Point3 } from "./flight";
+import { bounds } from "./bounds";
+import { type Flight, homeAt, type Moment } from "./flight";
+import type { Point2, Point3 } from "./flight_data";
 import * as marks from "./marks";
 import { Overlay } from "./overlay";
 import { bright, colour, darker, dim } from "./palette";
@@ -40,10 +42,7 @@ export class MapView implements View {
     this.overlay = new Overlay(this.pen, flight, (point) => this.pixel(point));
     this.trail = new Trail("uas", [flight]);
     this.seen = sheets(flight);
-    const { outline } = flight.scene.fence;
-    const [north, east] = [0, 1].map((axis) => outline.map((corner) => corner[axis]));
-    this.low = [Math.min(...north), Math.min(...east)];
-    this.high = [Math.max(...north), Math.max(...east)];
+    [this.low, this.high] = bounds(flight.scene.fence.outline);
     const extent = Math.max(this.high[0] - this.low[0], this.high[1] - this.low[1]);
     this.gridStep = roundStep(extent / 4);
   }

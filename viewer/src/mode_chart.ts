@@ -15,7 +15,7 @@ const MANY = 8;
 const PAINT: Record<string, [string, string]> = {
   covering: ["--covering", "#ffffff"],
   transit: ["--transit", "#1b1b1b"],
-  return: ["--return", "#1b1b1b"],
+  return: ["--returning", "#1b1b1b"],
   landed: ["--landed", "#1b1b1b"],
   lost: ["--discharged", "#ffffff"],
 };
@@ -31,8 +31,9 @@ export class ModeChart extends TimeCanvas {
   protected drawStill(): void {
     this.write("Operation mode", 2, 9, colour("--ink"), "left", 600);
     let right = this.width - RIGHT;
-    for (const mode of [...this.flight.data.modes].reverse()) {
-      if (!this.flight.data.mode.includes(this.flight.data.modes.indexOf(mode))) continue;
+    const used = new Set(this.flight.data.mode_runs.flat().map(([mode]) => mode));
+    for (const [m, mode] of [...this.flight.data.modes.entries()].reverse()) {
+      if (!used.has(m)) continue;
       right -= this.write(mode, right, 9, colour("--faint"), "right") + 14;
       this.pen.fillStyle = colour(PAINT[mode][0]);
       this.pen.fillRect(right, 4, 10, 10);
@@ -50,7 +51,7 @@ export class ModeChart extends TimeCanvas {
         this.write(shortName(uas.name), 35, y + height / 2, legible(uas.colour), "right", 600);
       }
       const gap = height >= WORDS_PX ? 3 : 1;
-      for (const [mode, from, to] of this.runs(i)) this.band(mode, from, to, y, height - gap);
+      this.bands(i, y, height - gap);
     });
   }
 
@@ -63,7 +64,7 @@ export class ModeChart extends TimeCanvas {
     if (this.focused !== null) {
       const { name, colour: hex } = this.flight.scene.uas[this.focused];
       this.write(shortName(name), 35, TOP + 6, legible(hex), "right", 600);
-      for (const [mode, from, to] of this.runs(this.focused)) this.band(mode, from, to, TOP, 13);
+      this.bands(this.focused, TOP, 13);
     }
     const [top, bottom] = [TOP + own, this.height - 6];
     const unit = (bottom - top) / this.flight.uas;
@@ -73,8 +74,9 @@ export class ModeChart extends TimeCanvas {
       // whole pixels, or seams would be seen
       const [x, end] = [k, k + 1].map((each) => Math.round(this.x(each * dt_s)));
       let y = bottom;
-      for (const [m, mode] of modes.entries()) {
-        const high = unit * this.count(k, m);
+      const counts = this.counts(k);
+      for (const mode of modes) {
+        const high = unit * (counts.get(mode) ?? 0);
         this.pen.fillStyle = colour((PAINT[mode] ?? ["--landed"])[0]);
         this.pen.fillRect(x, y - high, end - x, high);
         y -= high;
@@ -82,23 +84,33 @@ export class ModeChart extends TimeCanvas {
     }
   }
 
-  /** How many are in a mode at a sample. */
-  private count(k: number, mode: number): number {
-    const { uas } = this.flight;
-    return this.flight.data.mode.slice(k * uas, (k + 1) * uas).filter((m) => m === mode).length;
+  /** How many are in each mode at a sample. */
+  private counts(k: number): Map<string, number> {
+    const counts = new Map<string, number>();
+    for (let i = 0; i < this.flight.uas; i++) {
+      const mode = this.flight.mode(k, i);
+      counts.set(mode, (counts.get(mode) ?? 0) + 1);
+    }
+    return counts;
   }
 
   protected words(time: number): string {
     const k = this.flight.moment(time).sample;
     const { modes } = this.flight.data;
     if (this.flight.uas > MANY) {
+      const counts = this.counts(k);
       return modes
-        .map((mode, m) => [this.count(k, m), mode] as const)
-        .filter(([count]) => count > 0)
-        .map(([count, mode]) => `${count} ${mode}`)
+        .filter((mode) => counts.has(mode))
+        .map((mode) => `${counts.get(mode)} ${mode}`)
         .join(", ");
     }
     return this.flight.scene.uas.map(({ name }, i) => `${name} ${this.flight.mode(k, i)}`).join(", ");
+  }
+
+  /** What one UAS was doing, from left to right. */
+  private bands(i: number, y: number, height: number): void {
+    const { modes, mode_runs: runs } = this.flight.data;
+    for (const [mode, from, to] of runs[i]) this.band(modes[mode], from, to, y, height);
   }
 
   private band(mode: string, from: number, to: number, y: number, height: number): void {
@@ -110,19 +122,5 @@ export class ModeChart extends TimeCanvas {
     pen.fillRect(x, y, Math.max(1.5, end - x - 1), height);
     pen.font = "400 11px system-ui, sans-serif";
     if (height >= WORDS_PX + 1 && pen.measureText(mode).width + 8 < end - x) this.write(mode, x + 4, y + height / 2, ink);
-  }
-
-  /** [mode, first sample, first sample of the next], in order of time. */
-  private runs(i: number): [string, number, number][] {
-    const runs: [string, number, number][] = [];
-    for (let k = 0; k < this.flight.data.samples; k++) {
-      const mode = this.flight.mode(k, i);
-      const last = runs.at(-1);
-      if (last?.[0] === mode) last[2] = k + 1;
-      else runs.push([mode, k, k + 1]);
-    }
-    // the last sample is a moment, not a second of flight
-    if (runs.length > 0) runs.at(-1)![2] = Math.max(runs.at(-1)![1], this.flight.data.samples - 1);
-    return runs;
   }
 }

@@ -1,7 +1,7 @@
 // Other flights onto the page: replay pages, or the flight directories that hold them, dropped or chosen.
 
 import { element } from "./dom";
-import type { FlightData } from "./flight";
+import type { FlightData } from "./flight_data";
 
 const NAME = "replay.html";
 const MOST_BYTES = 256 * 2 ** 20;

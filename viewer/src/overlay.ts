@@ -1,7 +1,8 @@
 // What is drawn over the map and over the 3D scene alike, wherever a point of the flight lies on
 // the picture: rings of charge, names, violations, points of no return, what was clicked.
 
-import { FEW, type Flight, type Moment, type Point2, type Point3 } from "./flight";
+import { FEW, type Flight, type Moment } from "./flight";
+import type { Point2, Point3 } from "./flight_data";
 import * as marks from "./marks";
 import { bright, colour, legible } from "./palette";
 import type { Focus } from "./view";

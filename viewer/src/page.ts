@@ -3,7 +3,8 @@
 import { Clock } from "./clock";
 import { Controls, type Saved, type ViewChoice } from "./controls";
 import { element } from "./dom";
-import { Flight, type FlightData } from "./flight";
+import { Flight } from "./flight";
+import type { FlightData } from "./flight_data";
 import { Pace } from "./pace";
 import { onThemeChange } from "./palette";
 import { Panel } from "./panel";

@@ -1,7 +1,8 @@
-// Colours: those of the page are custom properties of style.css, light and dark; those of things
-// on the map come with the flight and are fitted to the dark ground here.
+// Colours: those of the page are custom properties, light and dark, that uas_coverage_env/draw/
+// colours.py writes into it; those of things on the map come with the flight and are fitted to the dark ground here.
 
 import { mixed, readOn } from "./contrast";
+import { LITTLE_SPARE } from "./flight";
 
 const DARK = matchMedia("(prefers-color-scheme: dark)");
 
@@ -56,9 +57,6 @@ export function dim(hex: string): string {
 export function darker(hex: string, share: number): string {
   return mixed(hex, 0, share);
 }
-
-/** Charge beyond the way home below which it is said to be little. */
-export const LITTLE_SPARE = 0.05;
 
 /** Green: enough charge for the way home with margin; yellow: little more; red: not enough. */
 export function ofSpare(spare: number): string {

@@ -5,7 +5,8 @@ import type { TimeCanvas } from "./chart";
 import { curves } from "./curves";
 import { difference } from "./difference";
 import { element } from "./dom";
-import { type Flight, type Mark, type Moment, words } from "./flight";
+import { type Flight, type Moment, words } from "./flight";
+import type { Mark } from "./flight_data";
 import { MapView } from "./map";
 import { type Picked, Picker } from "./pick";
 import { ProfileChart } from "./profile";
@@ -169,6 +170,7 @@ export class Panel {
       this.cards.element,
       ...this.violations(),
       ...this.marks(),
+      figures(this.flight),
       this.curveBox,
     );
   }
@@ -269,6 +271,19 @@ export class Panel {
 
 function title(flight: Flight): string {
   return `${flight.scene.name} · ${flight.data.planner}`;
+}
+
+/** All figures, in a table that opens. */
+function figures(flight: Flight): HTMLElement {
+  const rows = flight.data.figures.map(([heading, text]) =>
+    element("tr", {}, element("th", { scope: "row" }, heading), element("td", {}, text)),
+  );
+  return element(
+    "details",
+    { class: "figures" },
+    element("summary", {}, "figures"),
+    element("table", {}, element("tbody", {}, ...rows)),
+  );
 }
 
 function outcome(flight: Flight): string {

@@ -1,6 +1,7 @@
 // What lies under a click on the map or in the 3D scene: a UAS, a waypoint, or a leg flown.
 
-import type { Flight, Moment, Point2, Point3 } from "./flight";
+import type { Flight, Moment } from "./flight";
+import type { Point2, Point3 } from "./flight_data";
 import { coveredBy, legs, legWords, waypointWords } from "./legs";
 
 export interface Picked {

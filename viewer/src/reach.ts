@@ -1,7 +1,7 @@
 // How far a UAS can still fly in each direction and come home: the charge that is left after the
 // straight flight there is what the way home from there takes, with margin.
 
-import type { Point3, ReachData } from "./flight";
+import type { Point3, ReachData } from "./flight_data";
 
 const DIRECTIONS = 72;
 

@@ -2,7 +2,8 @@
 
 import { AmbientLight, Color, DirectionalLight, PCFShadowMap, Scene, WebGLRenderer } from "three";
 import { element } from "./dom";
-import type { Flight, Moment, Point2, Point3 } from "./flight";
+import type { Flight, Moment } from "./flight";
+import type { Point2, Point3 } from "./flight_data";
 import { words } from "./marks";
 import { Overlay } from "./overlay";
 import { colour } from "./palette";

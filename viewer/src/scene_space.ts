@@ -1,7 +1,7 @@
 // From the flight's frame (north, east, down) to the scene's (x east, y up, z south).
 
 import { BufferGeometry, Float32BufferAttribute, Vector3 } from "three";
-import type { Body, Point3 } from "./flight";
+import type { Body, Point3 } from "./flight_data";
 
 export function place(point: Point3): Vector3 {
   return new Vector3(point[1], -point[2], -point[0]);

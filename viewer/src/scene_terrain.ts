@@ -1,5 +1,6 @@
 // What stands still: ground, water, fence, obstacles, and trees where an obstacle is a forest.
 
+import { bounds } from "./bounds";
 import {
   BufferGeometry,
   Color,
@@ -20,7 +21,7 @@ import {
   ShapeGeometry,
   Vector3,
 } from "three";
-import type { Obstacle, Point2, Point3, Scene } from "./flight";
+import type { Obstacle, Point2, Point3, Scene } from "./flight_data";
 import { bodyGeometry } from "./scene_space";
 import { bright, colour, darker, dim } from "./palette";
 import { roundStep } from "./round_step";
@@ -127,10 +128,7 @@ function area(outline: Point2[], paint: string, height: number): Mesh {
 /** Lines every 1, 2 or 5 times a power of ten metres, some five over the area. */
 function gridLines(outline: Point2[], ground: number, step: number): LineSegments {
   const values: number[] = [];
-  const [low, high] = [Math.min, Math.max].map((pick) => [
-    pick(...outline.map((p) => p[0])),
-    pick(...outline.map((p) => p[1])),
-  ]);
+  const [low, high] = bounds(outline);
   for (let n = Math.ceil(low[0] / step) * step; n <= high[0]; n += step) {
     values.push(low[1], ground, -n, high[1], ground, -n);
   }

@@ -1,7 +1,9 @@
 // The ground that cameras have seen, painted picture by picture: a sheet for each kind of camera,
 // north up, over the box around the fence.
 
-import type { Flight, Point2 } from "./flight";
+import { bounds } from "./bounds";
+import type { Flight } from "./flight";
+import type { Point2 } from "./flight_data";
 
 /** Of a sheet's longer side [px]. */
 const SIDE_PX = 1024;
@@ -55,9 +57,6 @@ export class SeenSheet {
 
 /** The sheets of a flight, none where no UAS carries a camera. */
 export function sheets(flight: Flight): SeenSheet[] {
-  const { outline } = flight.scene.fence;
-  const [north, east] = [0, 1].map((axis) => outline.map((corner) => corner[axis]));
-  const low: Point2 = [Math.min(...north), Math.min(...east)];
-  const high: Point2 = [Math.max(...north), Math.max(...east)];
+  const [low, high] = bounds(flight.scene.fence.outline);
   return flight.data.seen.map((_, n) => new SeenSheet(flight, n, low, high));
 }

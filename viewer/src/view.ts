@@ -1,6 +1,7 @@
 // A view draws one flight at a moment: the 3D scene, or the map where there is no WebGL.
 
-import type { Flight, Moment, Point2, Point3 } from "./flight";
+import type { Flight, Moment } from "./flight";
+import type { Point2, Point3 } from "./flight_data";
 import type { Trail } from "./trail";
 
 /** Where a 3D camera looks from: its offset from what it looks at, and that point. */

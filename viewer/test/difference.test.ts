@@ -4,9 +4,8 @@ import { difference } from "../src/difference";
 import { Flight } from "../src/flight";
 import { someFlight } from "./some_flight";
 
-test("energy is voltage times current until then", () => {
+test("energy is that of all UAS until then, between samples in proportion", () => {
   const flight = new Flight(someFlight());
-  // two UAS of 15 V and 10 A, half a second a sample
   const perSample = (2 * 150 * 0.5) / 3600;
   for (const [time, samples] of [[0, 0], [0.5, 1], [0.75, 1.5], [1, 2], [9, 2]]) {
     assert.ok(Math.abs(flight.energy(time) - samples * perSample) < 1e-9);
@@ -17,7 +16,7 @@ test("the difference of two flights is told with its signs", () => {
   const mine = new Flight(someFlight());
   const theirs = someFlight();
   theirs.planner = "tour";
-  theirs.current.values = theirs.current.values.map((value) => 100 * value);
+  theirs.energy.values = theirs.energy.values.map((value) => 100 * value);
   theirs.covered = [0, 0, 0];
   assert.equal(
     difference(mine, new Flight(theirs), 1),

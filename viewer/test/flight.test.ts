@@ -1,7 +1,8 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { Flight, homeAt, words, type Point3 } from "../src/flight";
+import { Flight, homeAt, words } from "../src/flight";
+import type { Point3 } from "../src/flight_data";
 import { someFlight } from "./some_flight";
 
 const near = (found: number[], expected: number[], by = 1e-9) => {
@@ -59,7 +60,7 @@ test("a flight that Python wrote is read as Python recorded it", () => {
   const flight = new Flight(data);
   assert.equal(flight.duration, expected.duration_s);
   assert.ok(expected.moments.length > 3);
-  for (const { time_s, position_m, soc, mode, covered } of expected.moments) {
+  for (const { time_s, position_m, soc, mode, covered, energy_Wh } of expected.moments) {
     const moment = flight.moment(time_s);
     moment.vehicles.forEach((vehicle, i) => {
       near(vehicle.position, position_m[i], 0.006);
@@ -67,6 +68,7 @@ test("a flight that Python wrote is read as Python recorded it", () => {
       assert.equal(vehicle.mode, mode[i]);
     });
     assert.equal(moment.covered, covered);
+    near([flight.energy(time_s)], [energy_Wh], 6e-4 * flight.uas);
   }
 });
 

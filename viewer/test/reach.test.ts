@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { ReachData } from "../src/flight";
+import type { ReachData } from "../src/flight_data";
 import { Flight } from "../src/flight";
 import { reachable } from "../src/reach";
 import { someFlight } from "./some_flight";

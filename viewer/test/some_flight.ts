@@ -1,6 +1,6 @@
 // A flight of two UAS over three samples, one of which is lost at the second.
 
-import type { FlightData } from "../src/flight";
+import type { FlightData } from "../src/flight_data";
 
 export function someFlight(): FlightData {
   const body = { corners: [], triangles: [], outline: [] };
@@ -52,18 +52,30 @@ export function someFlight(): FlightData {
       [0, 0.6],
     ],
     marks: [{ t_s: 0.5, until_s: 1, kind: "breach", uas: "uas_2", text: "too near" }],
+    // of 15 V and 10 A, half a second a sample
+    energy: series((150 * 0.5) / 3600, [0, 0, 1, 1, 2, 2]),
     voltage: series(0.001, new Array(6).fill(15000)),
     current: series(0.01, new Array(6).fill(1000)),
     moving: series(0.01, [0, 0, -1000, 0, 100, -1000, 0, 300, -1000]),
     duration: series(0.00001, [10, 20]),
     modes: ["covering", "transit", "return", "landed", "lost"],
-    mode: [0, 0, 0, 4, 1, 4],
+    mode_runs: [
+      [
+        [0, 0, 2],
+        [1, 2, 2],
+      ],
+      [
+        [0, 0, 1],
+        [4, 1, 2],
+      ],
+    ],
     last: [2, 1],
     covered: [0, 1, 1],
     covered_at: [1],
     fallbacks: [],
     plan: { unit: 0.1, steps: [[[10, 20, 30], []], []] },
     violations: [{ t_s: 0.5, uas: "uas_2", kind: "geofence", with: null }],
-    summary: { coverage: 1, steps: 2, energy_Wh: 1, all_home: false, breaches: 0 },
+    figures: [["steps", "2"]],
+    summary: { steps: 2, energy_Wh: 1, all_home: false, breaches: 0 },
   };
 }

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, JsonValue, field_validator, model_validator
 
 from uas_coverage_agents.policy.networks import Network
-from uas_coverage_env.env.observation import Group
+from uas_coverage_env.env.observation.block import Group
 from uas_coverage_env.env.observation.scales import FORMER_NAMES
 from uas_coverage_env.files.strict_toml import StrictModel
 

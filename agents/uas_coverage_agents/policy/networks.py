@@ -9,7 +9,5 @@ from uas_coverage_agents.policy.mlp import Mlp
 from uas_coverage_agents.policy.pointer import Pointer
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 
-__all__ = ["Mlp", "Network"]
-
 Network = Annotated[Attention | Mlp | Pointer | RouteNetworks, Field(discriminator="kind")]
 """Any network; several kinds are told apart by `kind`."""

@@ -8,7 +8,8 @@ from typing import Protocol
 from uas_coverage_agents.policy.directory import Policy, load_policy
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Assistants, AssistedOptions
-from uas_coverage_env.mission import MissionBrief, refuse_what_asks
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.world import Command, SwarmState
 
 

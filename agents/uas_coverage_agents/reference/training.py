@@ -25,7 +25,8 @@ from uas_coverage_agents.reference.policy import ReferencePolicy
 from uas_coverage_agents.reference.settings import Reference
 from uas_coverage_agents.training.model_arrays import learned, take_over
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
-from uas_coverage_env.env import OBSERVATIONS, full_state
+from uas_coverage_env.env import full_state
+from uas_coverage_env.env.observation.named import OBSERVATIONS
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.tasks import level_named, swarm_env

@@ -13,16 +13,13 @@ from uas_coverage_agents.route.improvement import improve
 from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import SPARE_S, build, no_record, route_workspace
-from uas_coverage_env.mission import (
-    Access,
-    GuidedFlight,
-    Handover,
-    MissionBrief,
-    Recall,
-    WorldView,
-    first_sight,
-)
-from uas_coverage_env.world import LANDED, Command, GoTo, SwarmState
+from uas_coverage_env.entities.state import LANDED
+from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission.access import Access
+from uas_coverage_env.mission.guided_flight import GuidedFlight
+from uas_coverage_env.mission.handover import Handover
+from uas_coverage_env.mission.recall import Recall
+from uas_coverage_env.world import Command, GoTo, SwarmState
 
 BoolArray = NDArray[np.bool_]
 SAMPLES = 64

@@ -8,8 +8,8 @@ from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, LEAD_S
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
-from uas_coverage_env.vehicle import fly_kinematics
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
 
 _LANDING_SHARE = 0.9

@@ -5,7 +5,8 @@ from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route import leg_flight, order
 from uas_coverage_agents.route.leg_flight import N_FLIGHT
 from uas_coverage_agents.route.order import N_ORDER
-from uas_coverage_env.env.observation import Feature, Group
+from uas_coverage_env.env.observation import Feature
+from uas_coverage_env.env.observation.block import Group
 
 LAYOUT = "routes_v1"
 

@@ -18,10 +18,8 @@ from uas_coverage_env.autopilot.guidance import HEADROOM_M, LEAD_S, passes_over
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
-from uas_coverage_env.vehicle import (
-    fly_kinematics,
-)
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import NO_WAY, ROUND_CORNER, crossing, route
 

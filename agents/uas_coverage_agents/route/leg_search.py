@@ -38,9 +38,8 @@ from uas_coverage_env.autopilot.lookahead import (
     moving_slack,
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.entities.commands import VELOCITY
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import COMMAND_DTYPE
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.routes import NO_WAY, route
 

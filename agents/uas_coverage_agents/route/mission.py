@@ -6,10 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_agents.route.clock import Mission
-from uas_coverage_env.mission import Legs, MissionBrief
+from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING, SwarmState, build_arena
+from uas_coverage_env.world import SwarmState, build_arena
 
 WEIGHT = 0.6
 """Of a second of any flight against one of the longest: the default of `trajectory`."""

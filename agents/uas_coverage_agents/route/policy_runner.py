@@ -20,7 +20,8 @@ from uas_coverage_agents.route.leg_search import HORIZON, search_workspace
 from uas_coverage_agents.route.mission import WEIGHT
 from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal, in_large_missions
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import LearntWind, MissionBrief, first_sight, in_disturbances
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.learnt_wind import LearntWind, in_disturbances
 from uas_coverage_env.mission.raised import raised
 from uas_coverage_env.world import Command, SwarmState, Velocity, build_arena
 

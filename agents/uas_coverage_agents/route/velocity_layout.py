@@ -27,7 +27,8 @@ from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.lookahead import PLENTY_M
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
-from uas_coverage_env.env.observation import Feature, Group
+from uas_coverage_env.env.observation import Feature
+from uas_coverage_env.env.observation.block import Group
 from uas_coverage_env.env.observation.surroundings import free_way
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.height import lowest_altitude

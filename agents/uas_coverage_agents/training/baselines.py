@@ -10,7 +10,7 @@ from uas_coverage_agents.training.score import MEASURES, Validation
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import PlannerSpec
-from uas_coverage_env.replay.figures import BASELINES
+from uas_coverage_env.replay.figures.training import BASELINES
 from uas_coverage_env.scenario import Scenario
 
 NO_PLANNER = "none"

@@ -12,7 +12,7 @@ from benchmarl.environments.pettingzoo.common import (
 from torchrl.envs import EnvBase, PettingZooWrapper
 
 from uas_coverage_env.env import CoverageParallelEnv
-from uas_coverage_env.env.actions.kinds import kind_of
+from uas_coverage_env.env.versions import V0
 
 
 class CoverageTask(PettingZooClass):
@@ -35,7 +35,7 @@ class CoverageTask(PettingZooClass):
         """What makes an environment of TorchRL."""
         usual = {"action": "velocity" if continuous_actions else "waypoint", "flat_infos": True}
         config: dict[str, Any] = {**usual, **self.config}
-        masked = kind_of(config["action"]).choices > 0
+        masked = V0.kind_of(config["action"]).choices > 0
 
         def make() -> EnvBase:
             return PettingZooWrapper(
@@ -51,11 +51,11 @@ class CoverageTask(PettingZooClass):
 
     def supports_continuous_actions(self) -> bool:
         """Whether the action asked for is made of numbers, or none is asked for."""
-        return "action" not in self.config or not kind_of(self.config["action"]).choices
+        return "action" not in self.config or not V0.kind_of(self.config["action"]).choices
 
     def supports_discrete_actions(self) -> bool:
         """Whether the action asked for is a choice, or none is asked for."""
-        return "action" not in self.config or kind_of(self.config["action"]).choices > 0
+        return "action" not in self.config or V0.kind_of(self.config["action"]).choices > 0
 
     def has_state(self) -> bool:
         """There is one, for central critics."""

@@ -37,7 +37,7 @@ def train(
     algorithm: Annotated[
         str,
         typer.Argument(
-            metavar="ALGORITHM",
+            metavar="LEARNER",
             help=f"One of {', '.join(published_names())}, or a configuration of your own (.toml).",
         ),
     ],
@@ -46,7 +46,7 @@ def train(
         typer.Option(help="`generated`, or a scenario; default: from the configuration."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Directory; default: trainings/ALGORITHM-SEED.")
+        Path | None, typer.Option(help="Directory; default: trainings/LEARNER-SEED.")
     ] = None,
     seed: Annotated[
         int, typer.Option(min=0, max=_LAST_SEED, help="Seed of network, sampling and scenarios.")

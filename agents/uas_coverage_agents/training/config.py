@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AliasChoices, Field, model_validator
 
-from uas_coverage_agents.policy import ScenarioFamily
+from uas_coverage_agents.policy.description import ScenarioFamily
 from uas_coverage_agents.training.published import PUBLISHED, published_names
 from uas_coverage_agents.velocity.settings import VelocitySettings
 from uas_coverage_agents.waypoint.settings import WaypointSettings

@@ -9,13 +9,8 @@ from matplotlib.figure import Figure
 
 from uas_coverage_agents.training.checkpoint import CurvePoint
 from uas_coverage_env.files.plain_files import read_text, write_atomically
-from uas_coverage_env.replay.figures import (
-    CURVE,
-    Curve,
-    baseline_curves,
-    png_of,
-    training_figure,
-)
+from uas_coverage_env.replay.figures import png_of, training_figure
+from uas_coverage_env.replay.figures.training import CURVE, Curve, baseline_curves
 
 TABLE = CURVE
 PICTURE = "learning_curve.png"

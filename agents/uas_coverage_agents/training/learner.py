@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.policy import Network, Observation
+from uas_coverage_agents.policy.description import Observation
+from uas_coverage_agents.policy.networks import Network
 from uas_coverage_agents.training.config import TrainingConfig
 
 

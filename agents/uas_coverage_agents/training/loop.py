@@ -23,8 +23,6 @@ from uas_coverage_agents.training.score import MEASURES, Validation
 from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 from uas_coverage_env.scenario import Scenario
 
-__all__ = ["TrainingJob", "TrainingProgress", "curve_scenarios", "import_zip", "train"]
-
 CHECKPOINTS = "checkpoints"
 POLICY = "policy"
 

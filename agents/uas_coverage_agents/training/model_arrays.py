@@ -15,7 +15,7 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
 from uas_coverage_agents.training.learner import StatefulVecEnv
-from uas_coverage_env.env.state_dict import check_values
+from uas_coverage_env.env.batch.state_dict import check_values
 from uas_coverage_env.files.strict_toml import InputError
 
 Arrays = dict[str, NDArray[np.generic]]

@@ -22,10 +22,10 @@ from uas_coverage_agents.route.leg_flight import (
 from uas_coverage_agents.training.route_labels import Label, town_of
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.entities.commands import VELOCITY
-from uas_coverage_env.vehicle import fly_kinematics
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import COMMAND_DTYPE, build_arena
+from uas_coverage_env.vehicle.lpv import fly_kinematics
+from uas_coverage_env.world import build_arena
 
 MOST_STEPS = 900
 

@@ -17,13 +17,8 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from uas_coverage_agents.policy import (
-    PolicyDescription,
-    ScenarioFamily,
-    Towns,
-    Training,
-    save_policy,
-)
+from uas_coverage_agents.policy import PolicyDescription, save_policy
+from uas_coverage_agents.policy.description import ScenarioFamily, Towns, Training
 from uas_coverage_agents.route.clock import DONE, IN_THE_AIR, Mission
 from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.layout import route_networks
@@ -194,7 +189,7 @@ def _fit(network: nn.Sequential, rows: torch.Tensor, beyond_s: torch.Tensor) -> 
             optimiser.step()
 
 
-def main() -> None:
+def run_script() -> None:
     """Label, learn, save."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("out", type=Path)
@@ -253,4 +248,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script()

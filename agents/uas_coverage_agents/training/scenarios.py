@@ -1,6 +1,6 @@
 """Which scenarios a learner flies: towns drawn from seeds, or one scenario."""
 
-from uas_coverage_agents.policy import ScenarioFamily, Towns
+from uas_coverage_agents.policy.description import ScenarioFamily, Towns
 from uas_coverage_agents.training.config import TrainingScenarios
 from uas_coverage_env.scenario import Scenario, load_scenario, sample_scenario
 

@@ -8,14 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
-from uas_coverage_agents.policy import Interval, Policy, Score
+from uas_coverage_agents.policy import Policy
+from uas_coverage_agents.policy.description import Interval, Score
 from uas_coverage_agents.policy.directory import weights_sha256
 from uas_coverage_agents.policy.planner import runner_of
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.flight import Assistants, Planner
-from uas_coverage_env.leaderboard import FAILED, Entry, PlannerSpec, Row, source_of
+from uas_coverage_env.leaderboard import PlannerSpec, Row
 from uas_coverage_env.leaderboard.flying import fly as fly_entry
+from uas_coverage_env.leaderboard.row import FAILED
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
+from uas_coverage_env.leaderboard.sweep import Entry, source_of
 from uas_coverage_env.runner.jobs import Job, Workers
 from uas_coverage_env.runner.store import Store
 from uas_coverage_env.scenario import Scenario
@@ -131,7 +134,7 @@ def _measured(row: Row) -> list[float]:
     return [getattr(row, name) or 0.0 for name in _FIGURES.values()]
 
 
-def score(results: NDArray[np.float64], scenarios: str) -> Score:
+def score_of(results: NDArray[np.float64], scenarios: str) -> Score:
     """The means of `fly` with their 95 % bootstrap intervals.
 
     Args:

@@ -15,18 +15,13 @@ from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.policy import (
-    Policy,
-    PolicyDescription,
-    Training,
-    load_policy,
-    save_policy,
-)
+from uas_coverage_agents.policy import Policy, PolicyDescription, load_policy, save_policy
+from uas_coverage_agents.policy.description import Training
 from uas_coverage_agents.training.config import TrainingConfig
 from uas_coverage_agents.training.learner import Learner
 from uas_coverage_agents.training.learners import learner_of
 from uas_coverage_agents.training.scenarios import validation_scenarios
-from uas_coverage_agents.training.score import Validation, fly, score
+from uas_coverage_agents.training.score import Validation, fly, score_of
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario import Scenario
 
@@ -127,7 +122,7 @@ class TrainingRun:
         """Score it on unseen scenarios and write it; gives what was written."""
         family = self.job.config.scenarios.family
         scenarios = validation_scenarios(family, self.job.missions)
-        scored = score(self.flights(scenarios), f"{family.name}, validation")
+        scored = score_of(self.flights(scenarios), f"{family.name}, validation")
         policy = self.policy()
         described = policy.description.model_copy(update={"score": scored})
         save_policy(directory, described, policy.tensors)

@@ -16,13 +16,14 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env import ActionKind, CoverageBatch
-from uas_coverage_env.env.interface import observation_space, shown
-from uas_coverage_env.env.memory import STATUS
-from uas_coverage_env.env.state_dict import check_like, check_values
-from uas_coverage_env.env.tiles import Tiles
-from uas_coverage_env.scenario import Scenario, ScenarioLike
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.env.api.forms import observation_space, shown
+from uas_coverage_env.env.batch.state_dict import check_like, check_values
+from uas_coverage_env.env.rendering.tiles import Tiles
+from uas_coverage_env.env.report import STATUS
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
 
 
 class CoverageVecEnv(VecEnv):

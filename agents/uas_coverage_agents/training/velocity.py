@@ -14,7 +14,9 @@ from stable_baselines3.common.type_aliases import RolloutBufferSamples
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from uas_coverage_agents.policy import Mlp, Network, Observation
+from uas_coverage_agents.policy.description import Observation
+from uas_coverage_agents.policy.mlp import Mlp
+from uas_coverage_agents.policy.networks import Network
 from uas_coverage_agents.training.attention import AttentionPolicy
 from uas_coverage_agents.training.config import SacSettings, TrainingConfig
 from uas_coverage_agents.training.moving_obstacles import some_with_moving_obstacles

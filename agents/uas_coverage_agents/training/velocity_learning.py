@@ -23,15 +23,8 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from uas_coverage_agents.policy import (
-    Policy,
-    PolicyDescription,
-    ScenarioFamily,
-    Towns,
-    Training,
-    load_policy,
-    save_policy,
-)
+from uas_coverage_agents.policy import Policy, PolicyDescription, load_policy, save_policy
+from uas_coverage_agents.policy.description import ScenarioFamily, Towns, Training
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.leg_flight import (
@@ -53,15 +46,15 @@ from uas_coverage_agents.route.velocity_runner import RouteVelocityRunner, veloc
 from uas_coverage_agents.training import curve
 from uas_coverage_agents.training.checkpoint import CurvePoint
 from uas_coverage_agents.training.scenarios import town, validation_scenarios
-from uas_coverage_agents.training.score import MEASURES, fly, score
-from uas_coverage_env.autopilot import velocity_of
+from uas_coverage_agents.training.score import MEASURES, fly, score_of
 from uas_coverage_env.autopilot.control import write_command
-from uas_coverage_env.entities.commands import VELOCITY
+from uas_coverage_env.autopilot.guidance import velocity_of
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
-from uas_coverage_env.flight.interruption import unless_stopped
-from uas_coverage_env.scenario import LEVELS, Scenario, with_disturbances
-from uas_coverage_env.world import COMMAND_DTYPE
+from uas_coverage_env.flight.flight import unless_stopped
+from uas_coverage_env.scenario import Scenario, with_disturbances
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 
 CURVE_MISSIONS, SCORE_MISSIONS = 6, 40
 _RETREATS = [
@@ -340,19 +333,23 @@ def train(training: VelocityTraining, directory: Path, missions: int) -> None:
         curve.write(points, directory)
         print(f"round {number + 1} of {training.settings.rounds}: {points[-1]}", flush=True)
     policy = training.policy()
-    scored = score(fly(policy, unseen[:missions]), "generated, validation")
+    scored = score_of(fly(policy, unseen[:missions]), "generated, validation")
     described = policy.description.model_copy(update={"score": scored})
     save_policy(directory / "policy", described, policy.tensors)
 
 
-def main(argv: Sequence[str] | None = None) -> None:
+def run_script(argv: Sequence[str] | None = None) -> None:
     """Train, score and save."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--missions", type=int, default=SCORE_MISSIONS, help="it is scored on")
     parser.add_argument(
-        "--levels", nargs="*", default=[], choices=list(LEVELS), help="of wind, beside still air"
+        "--levels",
+        nargs="*",
+        default=[],
+        choices=list(DISTURBANCE_LEVELS),
+        help="of wind, beside still air",
     )
     asked = parser.parse_args(argv)
     settings = DaggerSettings(levels=tuple(asked.levels))
@@ -360,4 +357,4 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_script()

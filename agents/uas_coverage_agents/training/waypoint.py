@@ -8,7 +8,8 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.policy import Network, Observation
+from uas_coverage_agents.policy.description import Observation
+from uas_coverage_agents.policy.networks import Network
 from uas_coverage_agents.training.config import PpoSettings, TrainingConfig
 from uas_coverage_agents.training.moving_obstacles import some_with_moving_obstacles
 from uas_coverage_agents.training.pointer import PointerPolicy

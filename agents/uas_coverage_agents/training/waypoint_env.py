@@ -26,9 +26,9 @@ from uas_coverage_agents.waypoint.team import (
     NOT_HOME,
     TIME,
 )
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.env.state_dict import (
+from uas_coverage_env.env.batch.state_dict import (
     Limits,
     check_like,
     check_values,

@@ -8,11 +8,14 @@ from uas_coverage_agents.policy.attention import Attention
 from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
 from uas_coverage_agents.velocity.stuck_detection import StuckDetection
-from uas_coverage_env.env import OBSERVATION_SIZE, Observer, observation_columns
-from uas_coverage_env.env.actions import actions_of
-from uas_coverage_env.env.observation import OBSERVATION, SCALES
+from uas_coverage_env.env import OBSERVATION_SIZE, MissionInterface, observation_columns
+from uas_coverage_env.env.actions import ACTIONS
+from uas_coverage_env.env.actions.given import actions_of
+from uas_coverage_env.env.observation import OBSERVATION
+from uas_coverage_env.env.observation.scales import SCALES
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import Approach, MissionBrief, first_sight
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.approach import Approach
 from uas_coverage_env.world import Command, SwarmState, Velocity
 
 LAYOUT = "uas_coverage_v0"
@@ -59,14 +62,14 @@ class VelocityRunner:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile the observation."""
-        Observer(brief).observe(first_sight(brief))
+        MissionInterface(brief).observe(first_sight(brief))
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a new mission; nothing is drawn."""
-        self._observer = Observer(brief)
+        self._observer = MissionInterface(brief)
         self._approach = Approach(brief)
         self._stuck = StuckDetection(len(brief.uas), len(brief.waypoints), brief.dt_s)
-        ranges = actions_of("velocity", brief.as_scenario()).ranges
+        ranges = actions_of(ACTIONS[0], brief.as_scenario()).ranges
         lowest, self._middle, highest = np.moveaxis(ranges, 2, 0)
         self._below, self._above = self._middle - lowest, highest - self._middle
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.env.observation import Feature, Group
+from uas_coverage_env.env.observation import Feature
+from uas_coverage_env.env.observation.block import Group
 from uas_coverage_env.files.blocks import numbered
 from uas_coverage_env.planning.reserves import LEARNED_LEG
 

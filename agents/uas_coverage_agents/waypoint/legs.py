@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import CRUISE_SHARE
-from uas_coverage_env.autopilot import seconds_home
+from uas_coverage_env.autopilot.return_mode import seconds_home
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.planning.reserves import LEARNED_LEG, LEARNED_RETURN
@@ -16,8 +16,9 @@ from uas_coverage_env.vehicle.range import (
     SpeedLimits,
     flight_seconds,
 )
-from uas_coverage_env.world import Arena, route
+from uas_coverage_env.world import Arena
 from uas_coverage_env.world.arena import ARENA
+from uas_coverage_env.world.routes import route
 
 ROUTED_UNITS = 6.0
 """Longer legs than this are rarely flown: they are taken straight."""

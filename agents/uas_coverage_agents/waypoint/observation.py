@@ -20,11 +20,13 @@ from uas_coverage_agents.waypoint.layout import (
     K,
 )
 from uas_coverage_agents.waypoint.legs import home_leg_s, leg_s
-from uas_coverage_env.autopilot import path_length_home_m
+from uas_coverage_env.autopilot.guidance import path_length_home_m
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.planning.reserves import LEARNED_CLOCK_RESERVE
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING, HOME, route
+from uas_coverage_env.world.routes import route
 
 NO_TARGET = -2
 """Target of a UAS that has none; home is world's HOME, waypoints are their indices."""

@@ -20,27 +20,18 @@ from uas_coverage_agents.waypoint.layout import (
 )
 from uas_coverage_agents.waypoint.legs import legs_of
 from uas_coverage_agents.waypoint.observation import NO_TARGET
-from uas_coverage_agents.waypoint.scorer import best_choice, weights_of
+from uas_coverage_agents.waypoint.scorer import best_choice, scorer_weights
 from uas_coverage_agents.waypoint.search import Moment, Workspace, improve, no_plan, planned
 from uas_coverage_agents.waypoint.team import NO_UAS, Choices, choose, flight_code, next_to_decide
-from uas_coverage_env.autopilot import assistants
+from uas_coverage_env.autopilot.assist import assistants
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import (
-    GuidedFlight,
-    Handover,
-    MissionBrief,
-    WorldView,
-    first_sight,
-)
-from uas_coverage_env.world import (
-    COMMAND_DTYPE,
-    FLYING,
-    OUTCOME_DTYPE,
-    Command,
-    GoTo,
-    SwarmState,
-    WorldState,
-)
+from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission.guided_flight import GuidedFlight
+from uas_coverage_env.mission.handover import Handover
+from uas_coverage_env.world import Command, GoTo, SwarmState, WorldState
 
 
 def network(hidden: int, prior: float) -> Pointer:
@@ -85,7 +76,7 @@ class WaypointRunner:
             raise ValueError(f"network.kind is {described.network.kind!r}, not 'pointer'")
         if described.network != network(described.network.hidden, described.network.prior):
             raise ValueError("its network does not fit to its observation; train it anew")
-        self._weights = weights_of(described.network, policy.tensors)
+        self._weights = scorer_weights(described.network, policy.tensors)
         self._return_mode = bool(assistants.return_mode)
         self._safety_filter = bool(assistants.safety_filter)
         self._simulations = simulations

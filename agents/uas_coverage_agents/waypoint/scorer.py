@@ -31,7 +31,7 @@ class ScorerWeights(NamedTuple):
     prior: NDArray[np.float64]
 
 
-def weights_of(network: Pointer, tensors: Tensors) -> ScorerWeights:
+def scorer_weights(network: Pointer, tensors: Tensors) -> ScorerWeights:
     """The weights in the order in which they are used."""
     arrays = [np.array(tensors[name].T, dtype=np.float64, order="C") for name in network.shapes()]
     return ScorerWeights._make([*arrays, np.array([network.prior])])
@@ -49,7 +49,7 @@ def _layer(x, weight, bias, out):
 
 
 @allocating_kernel
-def score(weights, observation, scores):
+def write_scores(weights, observation, scores):
     """Write the score of every choice, see `Pointer`; those that are not there get -inf.
 
     Args:
@@ -99,7 +99,7 @@ def score(weights, observation, scores):
 @allocating_kernel
 def best_choice(weights, observation, legal, scores):
     """The legal choice with the highest score; `scores` (K+1,) is written."""
-    score(weights, observation, scores)
+    write_scores(weights, observation, scores)
     best = -1
     for k in range(K + 1):
         if legal[k] and (best < 0 or scores[k] > scores[best]):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_agents.waypoint.layout import HOME_CHOICE, K
 from uas_coverage_agents.waypoint.observation import NO_TARGET
-from uas_coverage_agents.waypoint.scorer import best_choice, score
+from uas_coverage_agents.waypoint.scorer import best_choice, write_scores
 from uas_coverage_agents.waypoint.team import (
     ENERGY,
     LEFT,
@@ -28,7 +28,8 @@ from uas_coverage_agents.waypoint.team import (
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.views import copy_arrays
-from uas_coverage_env.world import HOME, WorldState
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.world import WorldState
 
 PRICES_WH = {ENERGY: 1.0, TIME: 0.1, LEFT: 20.0, LOST_UAS: 100.0, NOT_HOME: 100.0}
 """What a mission costs [Wh]: as in training, energy and the time of the team; see `settings`."""
@@ -172,7 +173,7 @@ def simulate(
         if n <= change_at or keep_on:
             choice = planned(state.uncovered, plan, at, i, candidates, legal)
         if n == change_at:
-            score(weights, observation, workspace.scores)
+            write_scores(weights, observation, workspace.scores)
             other = _draw(workspace.scores, legal, choice, rng)
             if other >= 0:
                 choice = other

@@ -21,6 +21,8 @@ from uas_coverage_agents.waypoint.team import (
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.compiled.memory import Memory, Pool, Values
 from uas_coverage_env.compiled.views import Handover, copy_arrays, pool_view
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation.pool import (
     WorldPool,
@@ -30,8 +32,8 @@ from uas_coverage_env.simulation.pool import (
     start_of,
     state_of,
 )
-from uas_coverage_env.vehicle import DOD
-from uas_coverage_env.world import COMMAND_DTYPE, OUTCOME_DTYPE, WorldState, build_arena
+from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.world import WorldState, build_arena
 from uas_coverage_env.world.arena import ARENA
 
 legs_at = pool_view(LEGS)

@@ -16,14 +16,15 @@ from uas_coverage_agents.waypoint.observation import (
     covers,
     observe,
 )
-from uas_coverage_env.autopilot import has_to_return
+from uas_coverage_env.autopilot.return_mode import has_to_return
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.entities.state import STATE
-from uas_coverage_env.mission import find_blocked
-from uas_coverage_env.simulation import advance
-from uas_coverage_env.vehicle import Z
-from uas_coverage_env.world import COMMAND_DTYPE, FLYING, GO_TO, HOME, OUTCOME_DTYPE, VELOCITY
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, GO_TO, HOME, VELOCITY
+from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import FLYING, STATE
+from uas_coverage_env.mission.blocked import find_blocked
+from uas_coverage_env.simulation.step import advance
+from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world.arena import ARENA
 
 NO_UAS = -1

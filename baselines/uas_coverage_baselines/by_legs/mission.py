@@ -15,9 +15,10 @@ from uas_coverage_baselines.routing import (
     empty_routes,
     improve_routes,
 )
-from uas_coverage_env.mission import Handover, MissionBrief, first_sight
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.handover import Handover
 from uas_coverage_env.planning.reserves import BY_LEGS, BY_LEGS_RESERVE
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import Command, SwarmState
 
 BoolArray = NDArray[np.bool_]

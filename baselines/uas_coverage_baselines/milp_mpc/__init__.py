@@ -2,13 +2,8 @@
 
 from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
-from uas_coverage_baselines.milp_mpc.model.ocp import OCP, PAPER_OCP, Block, Priced, formulate
-from uas_coverage_baselines.milp_mpc.model.problem import (
-    PlanningProblem,
-    Trajectories,
-    Variables,
-    Weights,
-)
+from uas_coverage_baselines.milp_mpc.model.ocp import OCP, PAPER_OCP, Block, formulate
+from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
 from uas_coverage_baselines.milp_mpc.paper_planner import MilpMpcPaper
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc
 
@@ -21,9 +16,6 @@ __all__ = [
     "MilpMpcGuided",
     "MilpMpcPaper",
     "PlanningProblem",
-    "Priced",
-    "Trajectories",
     "Variables",
-    "Weights",
     "formulate",
 ]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
+from uas_coverage_env.entities.commands import Mode
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import Command, Mode, SwarmState, Velocity, Wrench
+from uas_coverage_env.world import Command, SwarmState, Velocity, Wrench
 
 
 def first_inputs(plan: Plan, swarm: SwarmState, mode: Callable[[str], Mode]) -> dict[str, Command]:

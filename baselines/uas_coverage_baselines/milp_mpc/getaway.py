@@ -18,12 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.flown import pushed
-from uas_coverage_env.vehicle import (
-    N_STATES,
-    VX,
-    VehicleParams,
-    compile_vehicle,
-)
+from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
+from uas_coverage_env.vehicle.layout import N_STATES, VX
 
 FloatArray = NDArray[np.float64]
 _FLEEING_S = 14.0

@@ -22,9 +22,10 @@ from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
 from uas_coverage_baselines.routing import Routes
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
+from uas_coverage_env.entities.commands import HOME, Mode
 from uas_coverage_env.mission import MissionBrief, Ways, first_sight
-from uas_coverage_env.vehicle import VX, VY
-from uas_coverage_env.world import HOME, Mode, SwarmState
+from uas_coverage_env.vehicle.layout import VX, VY
+from uas_coverage_env.world import SwarmState
 
 _HOMING_PER_M = 0.1  # cost of a metre from home for one step, once nothing is left to visit
 
@@ -62,7 +63,7 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
     """MILP-MPC with a global order as terminal cost.
 
     Args:
-        options: see `uas-coverage planners`.
+        options: see `uas-coverage planner list`.
         blocks: of the OCP; those that the option `blocks` names come after them.
     """
 

@@ -27,13 +27,14 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_env.mission import LearntWind, MissionBrief
-from uas_coverage_env.mission.learnt_wind import axes
+from uas_coverage_env.entities.commands import Mode
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.learnt_wind import LearntWind, axes
 from uas_coverage_env.vehicle import LinearModel, VehicleParams
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.governor import ORDER, design_velocity_loop, horizontal_axis
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
-from uas_coverage_env.world import Mode, SwarmState, Velocity
+from uas_coverage_env.world import SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
 

@@ -19,9 +19,10 @@ from uas_coverage_baselines.milp_mpc.modes import (
 from uas_coverage_baselines.milp_mpc.options import ModeOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.return_rule import ReturnRule
+from uas_coverage_env.entities.commands import HOME, Mode
 from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import HOME, Mode, SwarmState
+from uas_coverage_env.world import SwarmState
 
 _FARTHEST = 4.0  # horizons of cruising: with a metre's cost as low as this a UAS still sets off
 

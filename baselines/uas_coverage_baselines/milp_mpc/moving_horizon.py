@@ -26,16 +26,14 @@ from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_baselines.milp_mpc.silent_uas import SilentUas
 from uas_coverage_baselines.milp_mpc.steering import Steering
 from uas_coverage_baselines.rehearsal import rehearse_once
+from uas_coverage_env.entities.commands import HOME, Mode
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import (
-    Attempts,
-    Handover,
-    MissionBrief,
-    first_sight,
-    refuse_what_asks,
-    without,
-)
-from uas_coverage_env.world import FLYING, HOME, Command, GoTo, Mode, SwarmState
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.attempts import Attempts
+from uas_coverage_env.mission.handover import Handover, without
+from uas_coverage_env.mission.refusal import refuse_what_asks
+from uas_coverage_env.world import Command, GoTo, SwarmState
 
 _CAREFUL_WITHIN_M = 40.0  # of home a UAS that does not come nearer to it flies slowly
 

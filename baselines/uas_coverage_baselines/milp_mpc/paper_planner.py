@@ -24,15 +24,13 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.options import ModeOptions, with_default
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
-from uas_coverage_baselines.milp_mpc.solvers import (
-    SolverError,
-    SolverLimits,
-    SolveStatus,
-    solver_named,
-)
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolverError, SolveStatus
+from uas_coverage_env.entities.commands import Mode
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import MissionBrief, first_sight, refuse_what_asks
-from uas_coverage_env.world import Command, Mode, SwarmState
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.refusal import refuse_what_asks
+from uas_coverage_env.world import Command, SwarmState
 
 _ROUNDING_M = 1e-5  # a solution keeps its rows to 2e-6, and a breach is one by any amount
 
@@ -157,7 +155,7 @@ class MilpMpcPaper:
     up, or there is none) the rest of the last plan is flown, and where there is none the UAS hover.
 
     Args:
-        options: see `uas-coverage planners`.
+        options: see `uas-coverage planner list`.
         blocks: of the OCP; those that the option `blocks` names come after them.
     """
 

@@ -9,8 +9,9 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import ModeOptions, MovingHorizonOptions
+from uas_coverage_env.entities.commands import Mode
 from uas_coverage_env.mission import MissionBrief, Ways
-from uas_coverage_env.world import Mode, SwarmState
+from uas_coverage_env.world import SwarmState
 
 
 class MilpMpcOptions(MovingHorizonOptions, ModeOptions):
@@ -23,7 +24,7 @@ class MilpMpc(MovingHorizon[MilpMpcOptions]):
     Gasche et al., Sec. III. The paper's program itself, solved to a gap, is `milp-mpc-paper`.
 
     Args:
-        options: see `uas-coverage planners`.
+        options: see `uas-coverage planner list`.
         blocks: of the OCP; those that the option `blocks` names come after them.
     """
 

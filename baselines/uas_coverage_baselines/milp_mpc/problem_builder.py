@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
 from uas_coverage_baselines.milp_mpc.getaway import getaway_margin_m
-from uas_coverage_baselines.milp_mpc.model.blocks import coverable
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
-    seconds_home,
     seconds_onward,
+    straight_seconds_home,
 )
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.priority import seconds_saved
 from uas_coverage_baselines.milp_mpc.model.problem import (
     MovingHull,
@@ -24,12 +24,15 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     Weights,
 )
 from uas_coverage_baselines.milp_mpc.options import OcpOptions
-from uas_coverage_env.geometry import inner_factor
-from uas_coverage_env.mission import MissionBrief, Way, Ways, WorldView
+from uas_coverage_env.entities.commands import HOME
+from uas_coverage_env.geometry.round_shapes import inner_factor
+from uas_coverage_env.mission import MissionBrief, Ways, WorldView
+from uas_coverage_env.mission.ways import Way
 from uas_coverage_env.scenario import Uas
-from uas_coverage_env.vehicle import VehicleParams, dod_per_s, linear_model
+from uas_coverage_env.vehicle import VehicleParams, linear_model
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import HOME, SwarmState
+from uas_coverage_env.vehicle.range import dod_per_s
+from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 
@@ -77,8 +80,8 @@ class ProblemBuilder:
         """Flight time home, with a detour and the landing, see `BatteryReserve`."""
         way = self._way_home(name, self.way(name, HOME, position_m))
         if way is None:
-            return seconds_home(self._vehicles[name], self.home_m[name] - position_m)
-        return seconds_home(self._vehicles[name], way.corner_m - position_m) + way.onward_s
+            return straight_seconds_home(self._vehicles[name], self.home_m[name] - position_m)
+        return straight_seconds_home(self._vehicles[name], way.corner_m - position_m) + way.onward_s
 
     def way(
         self, name: str, target: int, position_m: FloatArray, speed_mps: float = 0.0

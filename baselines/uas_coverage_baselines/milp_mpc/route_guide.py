@@ -12,15 +12,16 @@ from uas_coverage_baselines.milp_mpc.model.problem import TourSegment
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.routing import (
     Routes,
-    RouteWindow,
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
-from uas_coverage_env.mission import Legs, MissionBrief
+from uas_coverage_baselines.routing.window import RouteWindow
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.planning.reserves import ORDER_GUIDE, ORDER_GUIDE_RESERVE
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]

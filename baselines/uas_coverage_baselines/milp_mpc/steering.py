@@ -15,7 +15,8 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
-from uas_coverage_env.mission import GuidedFlight, MissionBrief, first_sight
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 

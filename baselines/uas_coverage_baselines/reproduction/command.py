@@ -100,7 +100,8 @@ def _need_matplotlib() -> None:
 def _sweep(paper: "Paper", seeds: str, quick: bool, steps: int | None) -> "Sweep":
     """The map that stands for the paper's and those drawn, with the paper's planner."""
     from uas_coverage_env.leaderboard import Sweep, planner_specs_of, seed_range
-    from uas_coverage_env.scenario import flood_village, load_scenario
+    from uas_coverage_env.scenario import load_scenario
+    from uas_coverage_env.scenario.families.flood_village import flood_village
 
     drawn = seed_range("--seeds", seeds)
     maps = [load_scenario(paper.scenario), *map(flood_village, drawn[:1] if quick else drawn)]

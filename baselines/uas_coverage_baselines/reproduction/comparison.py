@@ -15,7 +15,8 @@ from uas_coverage_baselines.reproduction.published import (
     published_curves,
 )
 from uas_coverage_baselines.reproduction.settings import flown_setting
-from uas_coverage_env.flight import Flight, accomplished
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.leaderboard.statistics import Estimate, estimate
 
 _PAPER_DT_S = 1.0

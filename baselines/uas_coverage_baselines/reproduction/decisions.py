@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
+from uas_coverage_env.entities.state import FLYING, LANDED, LOST
 from uas_coverage_env.flight import MODES, Flight, covered_at
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import VX, VY
-from uas_coverage_env.world import FLYING, LANDED, LOST, SwarmState
+from uas_coverage_env.vehicle.layout import VX, VY
+from uas_coverage_env.world import SwarmState
 
 _NO_REACH_M = -1e4  # a distance that is kept wherever two UAS are
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.flight import MODES, Flight, covered_at
 from uas_coverage_env.mission import MissionBrief, WorldView
-from uas_coverage_env.vehicle import DOD, Y, return_threshold
+from uas_coverage_env.vehicle.layout import DOD, Y
+from uas_coverage_env.vehicle.params import return_threshold
 
 _FRESH, _TIRED = 0, 1
 _SNAPSHOT, _LATER = 70, 165

@@ -14,8 +14,9 @@ from uas_coverage_baselines.reproduction.comparison import FigureLine, Reproduce
 from uas_coverage_baselines.reproduction.sizes import GAP, SOLVED_FORM, ClassSize, Timing
 from uas_coverage_baselines.reproduction.sweeps import Trade
 from uas_coverage_env.files.output_dir import write_files
-from uas_coverage_env.flight import Flight, energy_Wh
-from uas_coverage_env.leaderboard import machine
+from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.metrics import energy_Wh
+from uas_coverage_env.leaderboard.hardware import machine
 from uas_coverage_env.leaderboard.table import NOTHING, Cells, markdown
 from uas_coverage_env.replay.figures import battery_figure, map_figure, png_of
 

@@ -4,7 +4,8 @@ import inspect
 from collections.abc import Callable, Mapping
 
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.vehicle import DOD, linear_model
+from uas_coverage_env.vehicle import linear_model
+from uas_coverage_env.vehicle.layout import DOD
 
 _ORDER = inspect.signature(linear_model).parameters["order"].default
 

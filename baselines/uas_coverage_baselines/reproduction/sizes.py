@@ -10,8 +10,9 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
-from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, SolveStatus
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 from uas_coverage_baselines.reproduction.decisions import (
     with_obstacles,
     with_waypoints,

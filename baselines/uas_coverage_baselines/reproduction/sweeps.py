@@ -8,8 +8,9 @@ import numpy as np
 from uas_coverage_baselines.reproduction.decisions import decision
 from uas_coverage_baselines.reproduction.sizes import Timing, open_cost, timed
 from uas_coverage_env.flight import Flight
-from uas_coverage_env.geometry import inner_factor
-from uas_coverage_env.vehicle import DOD, linear_model
+from uas_coverage_env.geometry.round_shapes import inner_factor
+from uas_coverage_env.vehicle import linear_model
+from uas_coverage_env.vehicle.layout import DOD
 
 _EXACT_ORDER = 16
 _HORIZON_STEPS = 18

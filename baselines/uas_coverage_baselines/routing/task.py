@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing.terrain import Terrain
-from uas_coverage_env.mission import Legs
-from uas_coverage_env.vehicle import VX, VY
+from uas_coverage_env.mission.legs import Legs
+from uas_coverage_env.vehicle.layout import VX, VY
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -10,10 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.mission import Legs, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.raised import raised
-from uas_coverage_env.world import Arena, route
-from uas_coverage_env.world.routes import ROUND_CORNER, leg_from_corner
+from uas_coverage_env.world import Arena
+from uas_coverage_env.world.routes import ROUND_CORNER, leg_from_corner, route
 
 FloatArray = NDArray[np.float64]
 _CORNERS = 20

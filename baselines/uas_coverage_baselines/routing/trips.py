@@ -22,9 +22,10 @@ from uas_coverage_baselines.routing.search import (
     improve_routes,
 )
 from uas_coverage_baselines.routing.task import GROUND_S, RoutingTask
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.simulation import initial_state
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.simulation.world import initial_state
+from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.packs import pack_records, swaps_alone
 
 FloatArray = NDArray[np.float64]

@@ -10,36 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from uas_coverage_baselines.by_legs import LegMission
+from uas_coverage_baselines.by_legs.mission import LegMission
 from uas_coverage_baselines.routing import Routes, SearchEffort
 from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve
 from uas_coverage_baselines.tour.pursuit import LEGS, PursuitTask, brake_seconds, empty_plan
 from uas_coverage_baselines.tour.schedule import Schedule, View
+from uas_coverage_env.entities.commands import COMMAND_DTYPE
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import (
-    GuidedFlight,
-    Handover,
-    LearntWind,
-    MissionBrief,
-    Recall,
-    Repeats,
-    WorldView,
-    first_sight,
-    in_disturbances,
-    without,
-)
+from uas_coverage_env.mission import MissionBrief, Repeats, WorldView, first_sight
+from uas_coverage_env.mission.guided_flight import GuidedFlight
+from uas_coverage_env.mission.handover import Handover, without
+from uas_coverage_env.mission.learnt_wind import LearntWind, in_disturbances
+from uas_coverage_env.mission.recall import Recall
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import (
-    COMMAND_DTYPE,
-    FLYING,
-    Arena,
-    Command,
-    GoTo,
-    SwarmState,
-    Velocity,
-)
+from uas_coverage_env.world import Arena, Command, GoTo, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
 _HORIZON_S = 8.0  # a longer plan has more in it than so many changes can improve

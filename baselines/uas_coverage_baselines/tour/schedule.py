@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import (
-    FreshPacks,
-    Packs,
     Routes,
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
-    improve_trips,
 )
-from uas_coverage_env.mission import MEAN_HEIGHT_M, Legs, MissionBrief
+from uas_coverage_baselines.routing.trips import FreshPacks, Packs, improve_trips
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M
+from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.planning.reserves import TOUR, TOUR_RESERVE, TOUR_SCARCE_RESERVE
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import Arena, SwarmState
 
 FloatArray = NDArray[np.float64]

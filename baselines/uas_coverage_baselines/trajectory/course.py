@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.braking import brake
 from uas_coverage_baselines.trajectory.fleet import Fleet
-from uas_coverage_baselines.trajectory.flight_model import excess, reduced_state, rollout
-from uas_coverage_baselines.trajectory.program import Flight
+from uas_coverage_baselines.trajectory.flight_model import excess, fly_inputs, reduced_state
+from uas_coverage_baselines.trajectory.program import PlannedFlight
 from uas_coverage_baselines.trajectory.space import apart_m, spare_of_rules_m
 from uas_coverage_env.vehicle import layout as S
 
@@ -69,13 +69,13 @@ class Course:
         return np.ascontiguousarray(path_m)
 
 
-def course_of(fleet: Fleet, uas: int, begin: int, x: FloatArray, flight: Flight) -> Course:
+def course_of(fleet: Fleet, uas: int, begin: int, x: FloatArray, flight: PlannedFlight) -> Course:
     """A flight as the world flies it."""
-    states, inputs, _ = rollout(fleet.arena.vehicles[uas], x, flight.u)
+    states, inputs, _ = fly_inputs(fleet.arena.vehicles[uas], x, flight.u)
     return Course(begin, states, inputs, True)
 
 
-def trouble_alone(fleet: Fleet, uas: int, x: FloatArray, flight: Flight) -> str | None:
+def trouble_alone(fleet: Fleet, uas: int, x: FloatArray, flight: PlannedFlight) -> str | None:
     """Why a flight must not be flown, None where nothing is wrong; other UAS are left aside.
 
     Limits are not looked at where the UAS is beyond one already: no plan led it there.
@@ -86,7 +86,7 @@ def trouble_alone(fleet: Fleet, uas: int, x: FloatArray, flight: Flight) -> str 
         x: (14,) its state.
         flight: From there.
     """
-    states, _, used = rollout(fleet.arena.vehicles[uas], x, flight.u)
+    states, _, used = fly_inputs(fleet.arena.vehicles[uas], x, flight.u)
     if not np.isfinite(states).all():
         return "not finite"
     is_beyond = excess(fleet.programs[uas].model, reduced_state(x)) > 0.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import POSITION, VELOCITY
-from uas_coverage_baselines.trajectory.program import Flight, FlightProgram
+from uas_coverage_baselines.trajectory.program import FlightProgram, PlannedFlight
 from uas_coverage_baselines.trajectory.space import Space
 from uas_coverage_baselines.trajectory.work import Work
 
@@ -49,9 +49,9 @@ class Speeds(NamedTuple):
 
 def first_flight(
     program: FlightProgram, terrain: Terrain, uas: int, start: FloatArray, route: IntArray
-) -> Work[Flight]:
+) -> Work[PlannedFlight]:
     """A flight along a route that violates nothing, however slow; else what violates least."""
-    best: Flight | None = None
+    best: PlannedFlight | None = None
     limits = program.model
     tries = [(slower, 0.0, False) for slower in _SLOWER]
     if np.abs(start[VELOCITY]).max() > 0.5:
@@ -81,8 +81,8 @@ def first_flight(
 
 
 def _mended(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight
-) -> Work[Flight]:
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight
+) -> Work[PlannedFlight]:
     """Visits moved where they are missed, until nothing is violated or nothing helps."""
     for _ in range(_MENDS):
         if flight.is_clear:
@@ -103,7 +103,7 @@ def _mended(
     return flight
 
 
-def deepest_visits(program: FlightProgram, flight: Flight, route: IntArray) -> IntArray:
+def deepest_visits(program: FlightProgram, flight: PlannedFlight, route: IntArray) -> IntArray:
     """Visits moved to the samples nearby at which the flight is deepest inside the sphere."""
     visits = flight.visits.copy()
     for k, waypoint in enumerate(route):

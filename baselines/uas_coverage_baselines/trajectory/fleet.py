@@ -9,16 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import FreshPacks, Packs, RoutingTask
+from uas_coverage_baselines.routing import RoutingTask
 from uas_coverage_baselines.routing.terrain import Terrain
+from uas_coverage_baselines.routing.trips import FreshPacks, Packs
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
 from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.program import (
     Allowance,
     Asked,
-    Flight,
     FlightProgram,
     Landing,
+    PlannedFlight,
 )
 from uas_coverage_baselines.trajectory.retiming import (
     Draft,
@@ -30,9 +31,10 @@ from uas_coverage_baselines.trajectory.retiming import (
 )
 from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_baselines.trajectory.work import Work, done
-from uas_coverage_env.mission import Access, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.access import Access
 from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -238,7 +240,7 @@ class Fleet:
         routes: Mapping[int, IntArray],
         movers: Mapping[int, Sequence[Body]],
         budget: int,
-        known: Mapping[tuple[int, bytes], Flight],
+        known: Mapping[tuple[int, bytes], PlannedFlight],
         threads: int = 1,
     ) -> dict[int, Draft]:
         """A flight of each UAS alone, to be finished by `flights`.
@@ -265,7 +267,7 @@ class Fleet:
         route: IntArray,
         movers: Sequence[Body],
         budget: int,
-        known: Mapping[tuple[int, bytes], Flight],
+        known: Mapping[tuple[int, bytes], PlannedFlight],
     ) -> Work[Draft]:
         """One of the `drafts`."""
         program = self.program(uas, {}, movers, _earliest(moment))
@@ -282,10 +284,10 @@ class Fleet:
         movers: Mapping[int, Sequence[Body]],
         drafts: Mapping[int, Draft],
         threads: int = 1,
-    ) -> dict[int, Flight]:
+    ) -> dict[int, PlannedFlight]:
         """Each UAS's quickest flight, whatever the others fly; arguments as for `drafts`."""
 
-        def alone(u: int) -> Flight:
+        def alone(u: int) -> PlannedFlight:
             return done(self.flight(moment, u, routes[u], movers[u], drafts[u]))
 
         with ThreadPoolExecutor(threads) as side_by_side:
@@ -293,7 +295,7 @@ class Fleet:
 
     def flight(
         self, moment: Moment, uas: int, route: IntArray, movers: Sequence[Body], begun: Draft
-    ) -> Work[Flight]:
+    ) -> Work[PlannedFlight]:
         """One of the `flights`."""
         program = self.program(uas, {}, movers, _earliest(moment))
         return finished(program, reduced_state(moment.x[uas]), route, begun)
@@ -303,10 +305,10 @@ class Fleet:
         moment: Moment,
         routes: Mapping[int, IntArray],
         movers: Mapping[int, Sequence[Body]],
-        alone: Mapping[int, Flight],
-    ) -> Work[dict[int, Flight]]:
+        alone: Mapping[int, PlannedFlight],
+    ) -> Work[dict[int, PlannedFlight]]:
         """The flights, of which a shorter one makes way for those that are longer."""
-        flights: dict[int, Flight] = {}
+        flights: dict[int, PlannedFlight] = {}
         for u in sorted(alone, key=lambda k: (-alone[k].steps, k)):
             paths_m = {k: flight.path_m for k, flight in flights.items()}
             program = self.program(u, paths_m, movers[u], _earliest(moment))
@@ -329,8 +331,8 @@ def _asked(brief: MissionBrief) -> Asked | None:
 
 
 def make_way(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight
-) -> Work[Flight]:
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight
+) -> Work[PlannedFlight]:
     """The flight clear of all bodies: as it is, bent, or some steps later; else as it is."""
     if program.spare_from_bodies_m(flight.path_m) >= 0.0 or not flight.is_clear:
         return flight

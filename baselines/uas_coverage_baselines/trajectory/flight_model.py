@@ -2,7 +2,7 @@
 
 Of the 14 states of the LPV model the program takes 10: of each horizontal axis position, velocity,
 tilt and rate, positive along the axis; then down and its rate. The heading is held by the inner
-loop, and the battery follows from the flight (`rollout`).
+loop, and the battery follows from the flight (`fly_inputs`).
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.belief import GUSTS, VERTICAL_GUSTS
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle import lpv_step, velocity_climb_wrench, write_limited
-from uas_coverage_env.vehicle.limits import N_LIMITS
+from uas_coverage_env.vehicle import lpv_step
+from uas_coverage_env.vehicle.inner_loop import velocity_climb_wrench
+from uas_coverage_env.vehicle.limits import N_LIMITS, write_limited
 
 FloatArray = NDArray[np.float64]
 
@@ -139,7 +140,7 @@ def reduced_state(x: FloatArray) -> FloatArray:
 
 
 @allocating_kernel
-def rollout(vehicle, start, inputs):
+def fly_inputs(vehicle, start, inputs):
     """Fly inputs of the program in the LPV model, as the world does.
 
     Args:

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing import (
-    OrderSearch,
     Routes,
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
+from uas_coverage_baselines.routing.search import OrderSearch
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import (
     HOPELESS,

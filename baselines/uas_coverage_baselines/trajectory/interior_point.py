@@ -26,7 +26,7 @@ from uas_coverage_baselines.trajectory.rows import (
     N_HARD,
     SoftRows,
     Values,
-    evaluate,
+    evaluate_rows,
     violations,
 )
 from uas_coverage_env.compiled.kernels import allocating_kernel
@@ -310,7 +310,7 @@ def _solve(model, loose, rows, x, u, iterations, complementarity):
     n_products = n_stages * (N_HARD + _BOUNDS) + 2 * n_soft
     converged, done = False, 0
     for done in range(iterations):
-        evaluate(model, loose, rows, x, u, values)
+        evaluate_rows(model, loose, rows, x, u, values)
         if done == 0:
             _begin(model, rows, values, at)
         worst, products = _add_slacks(at, values)

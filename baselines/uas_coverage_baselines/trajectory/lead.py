@@ -27,11 +27,12 @@ from uas_coverage_baselines.trajectory.flight_model import (
     in_wind,
     reduced_state,
 )
-from uas_coverage_baselines.trajectory.program import Air, Flight, FlightProgram, Landing
+from uas_coverage_baselines.trajectory.program import Air, FlightProgram, Landing, PlannedFlight
 from uas_coverage_baselines.trajectory.retiming import draft, finished, retimed, shorten
 from uas_coverage_baselines.trajectory.work import done
 from uas_coverage_env.autopilot.belief import wind_growth
-from uas_coverage_env.mission import MEAN_HEIGHT_M, LearntWind, MissionBrief
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind
 from uas_coverage_env.vehicle.governor import ON_RATE, ON_SPEED, ON_TILT, design_velocity_loop
 from uas_coverage_env.world import Arena
 
@@ -62,7 +63,7 @@ class _Ahead:
 
     route: IntArray
     end: int
-    flight: Flight
+    flight: PlannedFlight
 
 
 class Lead:
@@ -186,7 +187,9 @@ class Lead:
             return None
         return _Ahead(ahead.copy(), end, flight)
 
-    def _flying(self, uas: int, flight: Flight, wind_mps: FloatArray, n_steps: int) -> FloatArray:
+    def _flying(
+        self, uas: int, flight: PlannedFlight, wind_mps: FloatArray, n_steps: int
+    ) -> FloatArray:
         """(N, 3) commands that lead to the angular accelerations and the heights of a flight."""
         gain, trim = self._loops[uas].gain, float(self._arena.vehicles[uas].trim_rad_per_mps)
         n = min(n_steps, flight.steps)

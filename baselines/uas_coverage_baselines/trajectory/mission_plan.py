@@ -9,14 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import (
-    FreshPacks,
-    Routes,
-    RoutingTask,
-    SearchEffort,
-    empty_routes,
-    improve_trips,
-)
+from uas_coverage_baselines.routing import Routes, RoutingTask, SearchEffort, empty_routes
+from uas_coverage_baselines.routing.trips import FreshPacks, improve_trips
 from uas_coverage_baselines.trajectory.closed_off import closed_off
 from uas_coverage_baselines.trajectory.course import (
     Course,
@@ -26,11 +20,12 @@ from uas_coverage_baselines.trajectory.course import (
 )
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.options import TrajectoryOptions
-from uas_coverage_baselines.trajectory.program import Flight
+from uas_coverage_baselines.trajectory.program import PlannedFlight
 from uas_coverage_baselines.trajectory.retiming import Draft
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import Work, done
-from uas_coverage_env.world import FLYING, SwarmState
+from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -104,14 +99,14 @@ class Planned:
     """
 
     route: IntArray
-    flight: Flight
+    flight: PlannedFlight
     course: Course
 
     def open_visits(self, step: int, uncovered: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(K,) which visits are still to come and needed."""
         return uncovered[self.route] & (self.flight.visits + self.course.begin > step)
 
-    def rest(self, step: int, uncovered: NDArray[np.bool_]) -> tuple[IntArray, Flight]:
+    def rest(self, step: int, uncovered: NDArray[np.bool_]) -> tuple[IntArray, PlannedFlight]:
         """The route that is left at a sample, in order of time, and the flight along it."""
         left = np.flatnonzero(self.open_visits(step, uncovered))
         left = left[np.argsort(self.flight.visits[left], kind="stable")]
@@ -177,7 +172,7 @@ def plan_mission(
     effort: Effort,
     seed: int,
     kept: Routes | None = None,
-    flown: Mapping[int, tuple[IntArray, Flight]] | None = None,
+    flown: Mapping[int, tuple[IntArray, PlannedFlight]] | None = None,
     fresh: FreshPacks | None = None,
 ) -> MissionPlan:
     """The best plan found, without waypoints that are closed off; arguments as of `_best_plan`.
@@ -205,7 +200,7 @@ def _best_plan(
     effort: Effort,
     seed: int,
     kept: Routes | None,
-    flown: Mapping[int, tuple[IntArray, Flight]] | None,
+    flown: Mapping[int, tuple[IntArray, PlannedFlight]] | None,
     fresh: FreshPacks | None,
 ) -> MissionPlan:
     """The best plan found; the same arguments give the same plan.
@@ -293,7 +288,7 @@ def _flown(
     movers: Mapping[int, Sequence[Body]],
     effort: Effort,
     order: Routes,
-    known: dict[tuple[int, bytes], Flight],
+    known: dict[tuple[int, bytes], PlannedFlight],
     best: MissionPlan | None,
 ) -> MissionPlan | None:
     """An order with its flights and courses, as far as they are verified.
@@ -318,7 +313,7 @@ def flown_along(
     movers: Mapping[int, Sequence[Body]],
     effort: Effort,
     order: Routes,
-    known: Mapping[tuple[int, bytes], Flight],
+    known: Mapping[tuple[int, bytes], PlannedFlight],
     best_s: float,
 ) -> Work[MissionPlan | None]:
     """An order with its flights, planned in parts; None where it does not cost less than `best_s`.
@@ -332,7 +327,7 @@ def flown_along(
         drafts[u] = yield from fleet.draft(moment, u, route, movers[u], programs, known)
         if _least_s(fleet, effort, order, drafts) >= best_s:
             return None
-    alone: dict[int, Flight] = {}
+    alone: dict[int, PlannedFlight] = {}
     for u, route in routes.items():
         alone[u] = yield from fleet.flight(moment, u, route, movers[u], drafts[u])
     flights = yield from fleet.apart(moment, routes, movers, alone)
@@ -367,7 +362,7 @@ def _verified(
     step: int,
     effort: Effort,
     order: Routes,
-    flights: Mapping[int, Flight],
+    flights: Mapping[int, PlannedFlight],
 ) -> MissionPlan:
     """The flights that may be flown, alone and beside each other, as courses."""
     planned: dict[int, Planned] = {}

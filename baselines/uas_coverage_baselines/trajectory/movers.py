@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.trajectory.space import Body, apart_m
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle.layout import VX, VZ
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]

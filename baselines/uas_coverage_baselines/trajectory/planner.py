@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.by_legs import LegMission
+from uas_coverage_baselines.by_legs.mission import LegMission
 from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement, all_but_own
@@ -28,18 +28,12 @@ from uas_coverage_baselines.trajectory.steering import Failures, Steering
 from uas_coverage_baselines.trajectory.tracking import ProgramOf, tracked
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight.planner import Decision
-from uas_coverage_env.mission import (
-    Handover,
-    MissionBrief,
-    Range,
-    Repeats,
-    WorldView,
-    first_sight,
-    without,
-)
+from uas_coverage_env.mission import MissionBrief, Range, Repeats, WorldView, first_sight
+from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING, LANDED, Command, GoTo, SwarmState, Wrench
+from uas_coverage_env.world import Command, GoTo, SwarmState, Wrench
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -98,7 +98,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Flight:
+class PlannedFlight:
     """A flight of one UAS along a route.
 
     Attributes:
@@ -118,9 +118,9 @@ class Flight:
     violation: float
     missed_m: FloatArray
 
-    def after(self, steps: int, visits: IntArray) -> Flight:
+    def after(self, steps: int, visits: IntArray) -> PlannedFlight:
         """What is left of it after some steps, with some of its visits (indices)."""
-        return Flight(
+        return PlannedFlight(
             self.visits[visits] - steps,
             self.x[steps:],
             self.u[steps:],
@@ -185,7 +185,7 @@ class FlightProgram:
         guess: FloatArray,
         inputs: FloatArray | None = None,
         rounds: int = 3,
-    ) -> Flight:
+    ) -> PlannedFlight:
         """The flight that visits at given steps and lands at the last.
 
         Args:
@@ -220,15 +220,15 @@ class FlightProgram:
             missed_m = found.violation[: len(route)]
             forgiven = self._is_visited(route, missed_m)
             violation = float(found.violation.sum() - missed_m[forgiven].sum())
-            flight = Flight(visits, x, u, found.costate, violation, missed_m)
+            flight = PlannedFlight(visits, x, u, found.costate, violation, missed_m)
             if violation > _HOPELESS:
                 break
             if self.spare_m(flight.path_m) > -TOLERANCE_M:
                 break
-            flight = Flight(visits, x, u, found.costate, max(violation, 0.5), missed_m)
+            flight = PlannedFlight(visits, x, u, found.costate, max(violation, 0.5), missed_m)
         return flight
 
-    def allows(self, route: IntArray, flight: Flight) -> bool:
+    def allows(self, route: IntArray, flight: PlannedFlight) -> bool:
         """Whether a flight that was clear is so of these bodies, too, and visits in time."""
         in_time = self.earliest is None or bool((flight.visits >= self.earliest[route]).all())
         return in_time and flight.is_clear and self.spare_from_bodies_m(flight.path_m) >= 0.0
@@ -252,7 +252,7 @@ class FlightProgram:
             spare = min(spare, float(gap))
         return spare
 
-    def visits_all(self, route: IntArray, flight: Flight) -> bool:
+    def visits_all(self, route: IntArray, flight: PlannedFlight) -> bool:
         """Whether a flight passes through all spheres, whatever else it violates."""
         return bool(self._is_visited(route, flight.missed_m).all())
 
@@ -329,10 +329,10 @@ class FlightProgram:
         return result
 
 
-def _unsolved(visits: IntArray, guess: FloatArray) -> Flight:
+def _unsolved(visits: IntArray, guess: FloatArray) -> PlannedFlight:
     n_steps = len(guess) - 1
     nothing = np.zeros((n_steps, 10))
-    return Flight(
+    return PlannedFlight(
         visits, guess, np.zeros((n_steps, 3)), nothing, np.inf, np.full(len(visits), np.inf)
     )
 

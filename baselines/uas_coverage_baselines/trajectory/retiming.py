@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.first_guess import deepest_visits, first_flight
-from uas_coverage_baselines.trajectory.program import Flight, FlightProgram
+from uas_coverage_baselines.trajectory.program import FlightProgram, PlannedFlight
 from uas_coverage_baselines.trajectory.work import Work
 
 FloatArray = NDArray[np.float64]
@@ -42,7 +42,7 @@ class Worth(NamedTuple):
     cost: FloatArray
 
 
-def worth(flight: Flight) -> Worth:
+def worth(flight: PlannedFlight) -> Worth:
     """The shadow prices of time: what the costates say of one step along the flight."""
     order = np.argsort(flight.visits, kind="stable")
     # holding the state of a step for one more: the change of state that this saves, priced
@@ -59,7 +59,7 @@ def worth(flight: Flight) -> Worth:
     return Worth(order, gain, cost)
 
 
-def stretches(flight: Flight) -> tuple[IntArray, IntArray]:
+def stretches(flight: PlannedFlight) -> tuple[IntArray, IntArray]:
     """Rows of the visits by their step (K,), and steps between them (K+1,)."""
     order = np.argsort(flight.visits, kind="stable")
     return order, np.diff(np.concatenate([[0], flight.visits[order], [flight.steps]]))
@@ -76,11 +76,11 @@ def retimed(
     program: FlightProgram,
     start: FloatArray,
     route: IntArray,
-    flight: Flight,
+    flight: PlannedFlight,
     visits: IntArray,
     steps: int,
     rounds: int = 3,
-) -> Flight:
+) -> PlannedFlight:
     """The flight with other steps of the visits, its guess stretched in time between them."""
     old = np.concatenate([[0], np.sort(flight.visits), [flight.steps]]).astype(float)
     new = np.concatenate([[0], np.sort(visits), [steps]]).astype(float)
@@ -100,7 +100,7 @@ class Draft(NamedTuple):
         left: Programs to solve for that, about.
     """
 
-    flight: Flight
+    flight: PlannedFlight
     left: int
 
 
@@ -133,15 +133,15 @@ def draft(
 
 def finished(
     program: FlightProgram, start: FloatArray, route: IntArray, begun: Draft
-) -> Work[Flight]:
+) -> Work[PlannedFlight]:
     """The quickest flight found from a draft: steps are taken away one by one."""
     until = program.solved + begun.left
     return (yield from shorten(program, start, route, begun.flight, until))
 
 
 def _coarse(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight, until: int
-) -> Work[Flight]:
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight, until: int
+) -> Work[PlannedFlight]:
     """All stretches shorter at once; those in which time is dear get their steps back."""
     share, frozen = _FIRST_SHARE, np.zeros(len(route) + 1, bool)
     while share > _LAST_SHARE and program.solved < until:
@@ -177,8 +177,8 @@ def _coarse(
 
 
 def repair(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight, tries: int
-) -> Work[Flight]:
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight, tries: int
+) -> Work[PlannedFlight]:
     """Move steps between stretches until nothing is violated, or nothing helps."""
     tabu: set[bytes] = set()
     for _ in range(tries):
@@ -201,7 +201,7 @@ def repair(
     return flight
 
 
-def _candidates(program: FlightProgram, route: IntArray, flight: Flight) -> list[IntArray]:
+def _candidates(program: FlightProgram, route: IntArray, flight: PlannedFlight) -> list[IntArray]:
     """Visits to try: where the spheres are passed, then a step from cheap to dear stretches."""
     result = []
     near = deepest_visits(program, flight, route)
@@ -219,8 +219,8 @@ def _candidates(program: FlightProgram, route: IntArray, flight: Flight) -> list
 
 
 def shorten(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: Flight, until: int
-) -> Work[Flight]:
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight, until: int
+) -> Work[PlannedFlight]:
     """Take steps away, one by one, as long as a flight is left that violates nothing."""
     while program.solved < until:
         order, lengths = stretches(flight)

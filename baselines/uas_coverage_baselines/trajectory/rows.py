@@ -49,7 +49,7 @@ class Values(NamedTuple):
 
 
 @allocating_kernel
-def evaluate(model, loose, rows, x, u, values):
+def evaluate_rows(model, loose, rows, x, u, values):
     """Write the rows at a point, without slacks."""
     for n in range(1, len(x)):
         for k in range(CLIMB):

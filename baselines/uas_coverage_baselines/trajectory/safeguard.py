@@ -25,14 +25,15 @@ from uas_coverage_baselines.trajectory.course import (
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.space import spare_of_rules_m
-from uas_coverage_env.autopilot import assistants
-from uas_coverage_env.autopilot.assist import assist
+from uas_coverage_env.autopilot.assist import assist, assistants
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.entities.commands import GO_TO, HOME, WRENCH
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission import Range, WorldView
-from uas_coverage_env.vehicle import DELTA_THRUST
-from uas_coverage_env.world import FLYING, GO_TO, HOME, WRENCH, SwarmState
+from uas_coverage_env.vehicle.layout import DELTA_THRUST
+from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 

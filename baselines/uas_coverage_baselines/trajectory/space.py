@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.geometry import cylinder_clearance, segment_clearance
+from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
 from uas_coverage_env.world import Arena
 
 FloatArray = NDArray[np.float64]

@@ -12,7 +12,7 @@ from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.flight_model import reduced_state
 from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_baselines.trajectory.movers import Movers
-from uas_coverage_baselines.trajectory.program import Flight, FlightProgram
+from uas_coverage_baselines.trajectory.program import FlightProgram, PlannedFlight
 from uas_coverage_baselines.trajectory.retiming import repair, retimed, shifted, worth
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import done
@@ -74,7 +74,7 @@ def tracked(
 
 
 def _checked(
-    fleet: Fleet, uas: int, swarm: SwarmState, route: IntArray, flight: Flight
+    fleet: Fleet, uas: int, swarm: SwarmState, route: IntArray, flight: PlannedFlight
 ) -> Planned | None:
     """The flight, if it may be flown from where the UAS is."""
     if trouble_alone(fleet, uas, swarm.x[uas], flight) is not None:

@@ -13,7 +13,7 @@ from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_r
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_env.mission import Range
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 _AS_LONG_S = 10.0  # a UAS that can wait nearly as long as another may do so, too
 _OPENS_SHARE = 0.85  # of the other work: so late is what is blocked visited at first

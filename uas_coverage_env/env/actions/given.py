@@ -8,7 +8,6 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions.kind import ActionKind
-from uas_coverage_env.env.actions.kinds import kind_of
 from uas_coverage_env.scenario import Scenario
 
 _REAL = (np.dtype(np.float32), np.dtype(np.float64))
@@ -143,17 +142,12 @@ class Choice:
         return action
 
 
-def actions_of(kind: str | ActionKind, scenario: Scenario) -> Actions:
+def actions_of(kind: ActionKind, scenario: Scenario) -> Actions:
     """The actions of a kind, scaled to the fleet of a scenario.
 
-    Args:
-        kind: A kind, or the name of one of `ACTIONS`.
-        scenario: The scenario.
-
     Raises:
-        ValueError: There is no such kind, or its ranges are not what they should be.
+        ValueError: Its ranges are not what they should be.
     """
-    kind = kind_of(kind)
     ranges = kind.scaled_to(scenario)
     return Choice(kind, ranges) if kind.choices else Continuous(kind, ranges, kind.size)
 

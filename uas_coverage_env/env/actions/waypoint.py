@@ -8,7 +8,7 @@ from uas_coverage_env.entities.commands import GO_TO, HOME, VELOCITY, GoTo
 from uas_coverage_env.env.actions.kind import ActionKind
 from uas_coverage_env.env.observation.nearest import NO_TARGET
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
-from uas_coverage_env.vehicle import Z
+from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world.coverage import can_cover
 
 HOME_CHOICE = K_WAYPOINTS

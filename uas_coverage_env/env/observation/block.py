@@ -70,7 +70,7 @@ class ObservationBlock(Group):
     `uas_coverage_env.compiled.kernels.kernel`:
 
     - `arena`, the mission (`world.Arena`); `state`, the world (`world.WorldState`);
-    - `tables` and `learners`, what the environment adds (`env.memory`);
+    - `tables` and `learners`, what the environment adds (`env.episode.memory`);
     - `i`, the index of the UAS that observes;
     - `parameters`, (P,) float64, those of the block;
     - `row`, (size,) float32, this block's numbers, to be written within their bounds. It holds
@@ -81,6 +81,8 @@ class ObservationBlock(Group):
         parameters: Finite numbers that it is handed.
         shape: (channels, rows, columns) where the numbers, from 0 to 1, are a picture; see
             `images_apart` of the environments. Empty where they are none.
+        needs: Kernels `note(arena, state, tables, learners, i)` that are called before, once for
+            all blocks of an observation that have them; they write to `learners.notes[i]`.
 
     Raises:
         ValueError: A parameter is not finite, or the shape has another size than the group.
@@ -89,6 +91,7 @@ class ObservationBlock(Group):
     write: Any
     parameters: tuple[float, ...] = ()
     shape: tuple[int, ...] = ()
+    needs: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         check_parameters(f"observation block {self.name}", self.parameters)
@@ -97,6 +100,11 @@ class ObservationBlock(Group):
                 f"observation block {self.name}: shape is {self.shape}; give (channels, rows, "
                 f"columns) of {self.size} numbers"
             )
+
+    @property
+    def kernels(self) -> tuple[Any, ...]:
+        """What computes it."""
+        return (self.write, *self.needs)
 
 
 def flag(name: str, meaning: str) -> Feature:

@@ -7,10 +7,10 @@ Five channels of n x n cells, from 0 to 1. As a group it is a row of numbers lik
 import math
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.observation.block import Feature, ObservationBlock
-from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.coverage import can_cover
 
 _CHANNELS = (

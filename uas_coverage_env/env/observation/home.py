@@ -1,7 +1,8 @@
 """The way home past obstacles."""
 
 from uas_coverage_env.autopilot.guidance import target_position
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import inlined_kernel
+from uas_coverage_env.entities.commands import HOME as HOME_TARGET
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.relative import close, direction, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M
@@ -11,7 +12,6 @@ from uas_coverage_env.vehicle.range import (
     TravelTimeModel,
     flight_seconds,
 )
-from uas_coverage_env.world import HOME as HOME_TARGET
 from uas_coverage_env.world.routes import shortest_way
 
 OBSERVED = TravelTimeModel(in_turn=True)
@@ -28,13 +28,9 @@ _AT = Group("home", 1, _FEATURES).columns
 
 
 @inlined_kernel
-def _way_home(arena, state, i):
-    """The way home.
-
-    Returns:
-        End of the first leg, north and east [m]; length of the way [m]; how far the start is below
-        [m]; depth of discharge that the way costs.
-    """
+def note_way_home(arena, state, tables, learners, i):
+    """Note the way home, and what it costs at top speed."""
+    notes = learners.notes[i]
     uas = arena.uas[i]
     x = state.x[i, S.X]
     y = state.x[i, S.Y]
@@ -43,30 +39,22 @@ def _way_home(arena, state, i):
     leg_x, leg_y, way_m = shortest_way(arena, target, x, y, z, x1, y1, z1)
     speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
     flight_s = flight_seconds(OBSERVED, speeds, 0.0, way_m, 0.0, max(0.0, z1 - z))
-    return leg_x, leg_y, way_m, z1 - z, flight_s * uas.dod_per_s
-
-
-@kernel
-def charge_home(arena, state, i):
-    """Depth of discharge that the way home costs at top speed."""
-    _, _, _, _, home_dod = _way_home(arena, state, i)
-    return home_dod
+    notes.leg_m[0] = leg_x
+    notes.leg_m[1] = leg_y
+    notes.way_m = way_m
+    notes.below_m = z1 - z
+    notes.home_dod = flight_s * uas.dod_per_s
 
 
 @inlined_kernel
-def write_home(arena, state, i, row):
-    """Write the group; returns the depth of discharge that the way costs."""
-    leg_x, leg_y, way_m, below_m, home_dod = _way_home(arena, state, i)
-    direction(leg_x - state.x[i, S.X], leg_y - state.x[i, S.Y], row, _AT.direction)
-    row[_AT.closeness] = close(way_m)
-    row[_AT.below] = within(below_m * (1.0 / HEIGHT_M), -1.0, 1.0)
-    return home_dod
-
-
-@kernel
 def write(arena, state, tables, learners, i, parameters, row):
     """Write the group, see `ObservationBlock`."""
-    write_home(arena, state, i, row)
+    notes = learners.notes[i]
+    direction(
+        notes.leg_m[0] - state.x[i, S.X], notes.leg_m[1] - state.x[i, S.Y], row, _AT.direction
+    )
+    row[_AT.closeness] = close(notes.way_m)
+    row[_AT.below] = within(notes.below_m * (1.0 / HEIGHT_M), -1.0, 1.0)
 
 
-HOME = ObservationBlock("home", 1, _FEATURES, write)
+HOME = ObservationBlock("home", 1, _FEATURES, write, needs=(note_way_home,))

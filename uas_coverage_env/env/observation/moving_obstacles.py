@@ -1,6 +1,6 @@
 """The moving obstacles nearest to a UAS."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.kernels import inlined_kernel, stack_array
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -27,8 +27,8 @@ _WIDTH = _GROUP.width
 
 
 @inlined_kernel
-def write_moving_obstacles(arena, state, tables, i, row):
-    """Write the group."""
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
     scale = tables.scales[i]
     sample = min(state.step[0], arena.moving_path_m.shape[0] - 1)
     x = state.x[i]
@@ -55,12 +55,6 @@ def write_moving_obstacles(arena, state, tables, i, row):
         row[at + _AT.velocity] = within((velocity_mps[0] - x[S.VX]) * scale.per_v_xy, -2.0, 2.0)
         row[at + _AT.velocity + 1] = within((velocity_mps[1] - x[S.VY]) * scale.per_v_xy, -2.0, 2.0)
         row[at + _AT.velocity + 2] = within((velocity_mps[2] - x[S.VZ]) * scale.per_v_z, -2.0, 2.0)
-
-
-@kernel
-def write(arena, state, tables, learners, i, parameters, row):
-    """Write the group, see `ObservationBlock`."""
-    write_moving_obstacles(arena, state, tables, i, row)
 
 
 MOVING_OBSTACLES = ObservationBlock("moving_obstacles", K_MOVING, _FEATURES, write)

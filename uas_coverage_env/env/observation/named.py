@@ -13,15 +13,3 @@ OBSERVATIONS: Mapping[str, tuple[ObservationBlock, ...]] = {
     "grid": (*OBSERVATION, grid()),
 }
 """Name -> blocks."""
-
-
-def observation_named(name: str) -> tuple[ObservationBlock, ...]:
-    """The blocks of a named observation.
-
-    Raises:
-        ValueError: There is none of this name.
-    """
-    if name not in OBSERVATIONS:
-        known = ", ".join(OBSERVATIONS)
-        raise ValueError(f"observation is {name!r}; give one of {known}, or a tuple of blocks")
-    return OBSERVATIONS[name]

@@ -1,6 +1,7 @@
 """The other UAS that fly nearest to a UAS."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.kernels import inlined_kernel, stack_array
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -18,7 +19,6 @@ from uas_coverage_env.env.observation.relative import (
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_UAS
 from uas_coverage_env.env.observation.sorted_list import insert
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING
 
 _FEATURES = (
     flag("valid", "1 for a flying UAS; all are 0 where there is none"),
@@ -35,8 +35,8 @@ _WIDTH = _GROUP.width
 
 
 @inlined_kernel
-def write_others(arena, state, tables, i, row):
-    """Write the group."""
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
     x = state.x[i]
     scale = tables.scales[i]
     index = stack_array(K_UAS)
@@ -60,12 +60,6 @@ def write_others(arena, state, tables, i, row):
         row[at + _AT.velocity] = within((other[S.VX] - x[S.VX]) * scale.per_v_xy, -2.0, 2.0)
         row[at + _AT.velocity + 1] = within((other[S.VY] - x[S.VY]) * scale.per_v_xy, -2.0, 2.0)
         row[at + _AT.charge_left] = charge_left(arena, state, nearest)
-
-
-@kernel
-def write(arena, state, tables, learners, i, parameters, row):
-    """Write the group, see `ObservationBlock`."""
-    write_others(arena, state, tables, i, row)
 
 
 OTHERS = ObservationBlock("others", K_UAS, _FEATURES, write)

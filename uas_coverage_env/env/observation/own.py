@@ -1,14 +1,14 @@
 """The UAS itself: where it is, how it moves, what its battery holds, and how much is left to do."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
+from uas_coverage_env.compiled.kernels import inlined_kernel, rarely
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
-from uas_coverage_env.env.observation.home import charge_home
+from uas_coverage_env.env.observation.home import note_way_home
 from uas_coverage_env.env.observation.relative import charge_left, within
-from uas_coverage_env.env.observation.remaining import share_of_open_weight
+from uas_coverage_env.env.observation.remaining import note_open_weight
 from uas_coverage_env.env.observation.scales import MARGIN
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle import within_half_turn
-from uas_coverage_env.world import FLYING
+from uas_coverage_env.vehicle.inner_loop import within_half_turn
 
 _FEATURES = (
     Feature("position", 3, -1, 1, "north, east, up in the box around the fence; ±1: its sides"),
@@ -44,9 +44,10 @@ _AT = Group("own", 1, _FEATURES).columns
 
 
 @inlined_kernel
-def write_own(arena, state, tables, i, home_dod, open_share, row):
-    """Write the group where the charge for the way home and the open weight are known already."""
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
     x = state.x[i]
+    notes = learners.notes[i]
     scale = tables.scales[i]
     max_steps = arena.rules[0].max_steps
     row[_AT.position] = within((x[S.X] - scale.centre_m[0]) * scale.per_half_side[0], -1.0, 1.0)
@@ -74,17 +75,10 @@ def write_own(arena, state, tables, i, home_dod, open_share, row):
     row[_AT.polarisation] = within(x[S.U_TH], -1.0, 1.0)
     row[_AT.charge_left] = charge_left(arena, state, i)
     row[_AT.energy_margin] = within(
-        (arena.uas[i].dod_max - x[S.DOD] - home_dod) / MARGIN, -1.0, 1.0
+        (arena.uas[i].dod_max - x[S.DOD] - notes.home_dod) / MARGIN, -1.0, 1.0
     )
     row[_AT.time_left] = within((max_steps - state.step[0]) / max_steps, 0.0, 1.0)
-    row[_AT.uncovered] = within(open_share, 0.0, 1.0)
+    row[_AT.uncovered] = within(notes.open_share, 0.0, 1.0)
 
 
-@kernel
-def write(arena, state, tables, learners, i, parameters, row):
-    """Write the group, see `ObservationBlock`."""
-    home_dod = charge_home(arena, state, i)
-    write_own(arena, state, tables, i, home_dod, share_of_open_weight(arena, state, i), row)
-
-
-OWN = ObservationBlock("own", 1, _FEATURES, write)
+OWN = ObservationBlock("own", 1, _FEATURES, write, needs=(note_way_home, note_open_weight))

@@ -3,16 +3,16 @@
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array_f32
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.home import HOME
-from uas_coverage_env.env.observation.moving_obstacles import (
-    MOVING_OBSTACLES,
-    write_moving_obstacles,
-)
-from uas_coverage_env.env.observation.others import OTHERS, write_others
+from uas_coverage_env.env.observation.moving_obstacles import MOVING_OBSTACLES
+from uas_coverage_env.env.observation.moving_obstacles import write as write_moving_obstacles
+from uas_coverage_env.env.observation.others import OTHERS
+from uas_coverage_env.env.observation.others import write as write_others
 from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.env.observation.own import write as write_own
 from uas_coverage_env.env.observation.relative import close
 from uas_coverage_env.env.observation.surroundings import SURROUNDINGS
-from uas_coverage_env.env.observation.waypoints import WAYPOINTS, write_waypoints
+from uas_coverage_env.env.observation.waypoints import WAYPOINTS
+from uas_coverage_env.env.observation.waypoints import write as write_waypoints
 
 _OF_THE_SWARM = {
     "own": ("uncovered",),
@@ -63,7 +63,7 @@ def _write_own(arena, state, tables, learners, i, parameters, row):
 @kernel
 def _write_waypoints(arena, state, tables, learners, i, parameters, row):
     whole = stack_array_f32(_WAYPOINTS_SIZE)
-    write_waypoints(arena, state, tables, learners, i, whole)
+    write_waypoints(arena, state, tables, learners, i, parameters, whole)
     _forget(whole, _WAYPOINT_WIDTH, _WAYPOINT_NEAR, parameters[0])
     for c in range(_WAYPOINTS_SIZE // _WAYPOINT_WIDTH):
         for k in range(_N_WAYPOINT):
@@ -72,13 +72,13 @@ def _write_waypoints(arena, state, tables, learners, i, parameters, row):
 
 @kernel
 def _write_others(arena, state, tables, learners, i, parameters, row):
-    write_others(arena, state, tables, i, row)
+    write_others(arena, state, tables, learners, i, parameters, row)
     _forget(row, _OTHER_WIDTH, _OTHER_NEAR, parameters[0])
 
 
 @kernel
 def _write_moving(arena, state, tables, learners, i, parameters, row):
-    write_moving_obstacles(arena, state, tables, i, row)
+    write_moving_obstacles(arena, state, tables, learners, i, parameters, row)
     _forget(row, _MOVING_WIDTH, _MOVING_NEAR, parameters[0])
 
 
@@ -100,7 +100,7 @@ def local(range_m: float = 100.0) -> tuple[ObservationBlock, ...]:
     there = (float(range_m),)
     n = WAYPOINTS.repeats
     return (
-        ObservationBlock("own", 1, _kept(OWN), _write_own),
+        ObservationBlock("own", 1, _kept(OWN), _write_own, needs=OWN.needs),
         HOME,
         SURROUNDINGS,
         ObservationBlock("waypoints", n, _kept(WAYPOINTS), _write_waypoints, there),

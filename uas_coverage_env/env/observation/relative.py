@@ -4,7 +4,7 @@ import math
 
 from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.env.observation.scales import NEARBY_M
-from uas_coverage_env.vehicle import DOD
+from uas_coverage_env.vehicle.layout import DOD
 
 STRAIGHT_M = 1e-6
 """What is nearer than this horizontally is straight above or below [m]."""

@@ -1,11 +1,12 @@
 """Where the weight of the open waypoints lies."""
 
-from uas_coverage_env.compiled.kernels import counting_kernel, inlined_kernel, kernel, stack_array
+from uas_coverage_env.compiled.kernels import counting_kernel, inlined_kernel
 from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
+from uas_coverage_env.env.observation.notes import EAST, N_SECTORS, NORTH
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import FAR_M
-from uas_coverage_env.vehicle import X, Y
+from uas_coverage_env.vehicle.layout import X, Y
 from uas_coverage_env.world.waypoints import (
     ALL_SHARES,
     EAST_M,
@@ -15,9 +16,7 @@ from uas_coverage_env.world.waypoints import (
     SHARE_NORTH,
 )
 
-_N_SECTORS = 8
-_N_NE, _NE_E, _E_SE, _SE_S, _S_SW, _SW_W, _W_NW, _NW_N = range(_N_SECTORS)  # from, to
-_NORTH, _EAST, _N_SUMS = _N_SECTORS, _N_SECTORS + 1, _N_SECTORS + 2
+_N_NE, _NE_E, _E_SE, _SE_S, _S_SW, _SW_W, _W_NW, _NW_N = range(N_SECTORS)  # from, to
 
 _FEATURES = (
     Feature("sectors", 8, 0, 1, "share of the open weight in 45° from north over east"),
@@ -70,13 +69,15 @@ def _add_open(north_m, east_m, shares, shares_north, shares_east, uncovered, x, 
     sums[_W_NW] = eighth - half_eighth - quarter_eighth + all_three
     sums[_NW_N] = every - half - quarter - eighth
     sums[_NW_N] += half_quarter + half_eighth + quarter_eighth - all_three
-    sums[_NORTH] = north
-    sums[_EAST] = east
+    sums[NORTH] = north
+    sums[EAST] = east
 
 
 @inlined_kernel
-def _open_weight(arena, state, i, sums):
-    """See `_add_open`; returns the share of all weight that is open, in units of 1 / ALL_SHARES."""
+def note_open_weight(arena, state, tables, learners, i):
+    """Note where the weight of the open waypoints lies, and what share of all it is."""
+    notes = learners.notes[i]
+    sums = notes.open_sums
     n = state.uncovered.shape[0]
     columns = arena.waypoint_columns
     _add_open(
@@ -88,38 +89,27 @@ def _open_weight(arena, state, i, sums):
         state.uncovered, state.x[i, X], state.x[i, Y], sums,
     )  # fmt: skip
     left = 0.0
-    for s in range(_N_SECTORS):
+    for s in range(N_SECTORS):
         left += sums[s]
-    return left
-
-
-@kernel
-def share_of_open_weight(arena, state, i):
-    """Share of all weight that is still to be covered."""
-    return _open_weight(arena, state, i, stack_array(_N_SUMS)) * (1.0 / ALL_SHARES)
+    notes.open_share = left * (1.0 / ALL_SHARES)
 
 
 @inlined_kernel
-def write_remaining(arena, state, i, row):
-    """Write the group; returns the share of all weight that is still to be covered."""
-    sums = stack_array(_N_SUMS)
-    left = _open_weight(arena, state, i, sums)
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
+    sums = learners.notes[i].open_sums
+    left = 0.0
+    for s in range(N_SECTORS):
+        left += sums[s]
     per_share = 1.0 / left if left > 0.0 else 0.0
-    for s in range(_N_SECTORS):
+    for s in range(N_SECTORS):
         row[_AT.sectors + s] = within(sums[s] * per_share, 0.0, 1.0)
     there = 1.0 if left > 0.0 else 0.0
     to_m = per_share * arena.rules[0].unit_m
-    north_m = sums[_NORTH] * to_m - there * state.x[i, X]
-    east_m = sums[_EAST] * to_m - there * state.x[i, Y]
+    north_m = sums[NORTH] * to_m - there * state.x[i, X]
+    east_m = sums[EAST] * to_m - there * state.x[i, Y]
     row[_AT.centre] = within(north_m * (1.0 / FAR_M), -1.0, 1.0)
     row[_AT.centre + 1] = within(east_m * (1.0 / FAR_M), -1.0, 1.0)
-    return left * (1.0 / ALL_SHARES)
 
 
-@kernel
-def write(arena, state, tables, learners, i, parameters, row):
-    """Write the group, see `ObservationBlock`."""
-    write_remaining(arena, state, i, row)
-
-
-REMAINING = ObservationBlock("remaining", 1, _FEATURES, write)
+REMAINING = ObservationBlock("remaining", 1, _FEATURES, write, needs=(note_open_weight,))

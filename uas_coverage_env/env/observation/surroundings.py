@@ -7,7 +7,7 @@ from uas_coverage_env.compiled.views import rows_view, slice_view
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock
 from uas_coverage_env.env.observation.relative import within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, N_RAYS, RAY_M
-from uas_coverage_env.geometry import signed_distance
+from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.broad_phase import (
     BLOCK,
@@ -283,8 +283,8 @@ def _rays_to_obstacle(obstacle, normals, offsets_m, x, y, z, free_m):
 
 
 @inlined_kernel
-def write_surroundings(arena, state, i, row):
-    """Write the group: rays, nearest obstacle, fence."""
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`."""
     normals = arena.normals
     offsets_m = arena.offsets_m
     rules = arena.rules[0]
@@ -316,12 +316,6 @@ def write_surroundings(arena, state, i, row):
         row[_AT.rays + ray] = within(1.0 - free_m[ray] * (1.0 / RAY_M), 0.0, 1.0)
     row[_AT.clearance] = within(clearance_m * (1.0 / HEIGHT_M), -1.0, 1.0)
     row[_AT.fence] = within((inside_m - rules.fence_margin_m) * (1.0 / HEIGHT_M), -1.0, 1.0)
-
-
-@kernel
-def write(arena, state, tables, learners, i, parameters, row):
-    """Write the group, see `ObservationBlock`."""
-    write_surroundings(arena, state, i, row)
 
 
 SURROUNDINGS = ObservationBlock("surroundings", 1, _FEATURES, write)

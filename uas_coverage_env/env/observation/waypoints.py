@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, stack_array, stack_array_f32
+from uas_coverage_env.compiled.kernels import inlined_kernel, stack_array, stack_array_f32
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.observation.block import (
     DIRECTION,
     Feature,
@@ -16,7 +17,6 @@ from uas_coverage_env.env.observation.nearest import DENSITY, NEXT
 from uas_coverage_env.env.observation.relative import STRAIGHT_M, within
 from uas_coverage_env.env.observation.scales import HEIGHT_M, K_WAYPOINTS, MARGIN, NEARBY_M
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING
 from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, WEIGHT
 
 _ZERO, _ONE, _INFINITE = np.float32(0.0), np.float32(1.0), np.float32(math.inf)
@@ -83,8 +83,8 @@ def _near(distance_m):
 
 
 @inlined_kernel
-def write_waypoints(arena, state, tables, learners, i, row):
-    """Write the group.
+def write(arena, state, tables, learners, i, parameters, row):
+    """Write the group, see `ObservationBlock`.
 
     Feature by feature rather than waypoint by waypoint, always for as many as there may be: so
     the processor does several at a time. From the ways on in single precision, as they are told:
@@ -175,12 +175,6 @@ def write_waypoints(arena, state, tables, learners, i, row):
         row[_WIDTH * c + _AT.energy_margin] = margin[c]
     for at in range(_WIDTH * n, _WIDTH * K_WAYPOINTS):
         row[at] = _ZERO
-
-
-@kernel
-def write(arena, state, tables, learners, i, parameters, row):
-    """Write the group, see `ObservationBlock`."""
-    write_waypoints(arena, state, tables, learners, i, row)
 
 
 WAYPOINTS = ObservationBlock("waypoints", K_WAYPOINTS, _FEATURES, write)

@@ -1,11 +1,12 @@
 """The whole mission, the same for all UAS but for their order: for central critics and planners."""
 
 from uas_coverage_env.compiled.kernels import kernel
+from uas_coverage_env.entities.state import FLYING, LANDED, SWAPPING
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
 from uas_coverage_env.env.observation.relative import charge_left, within
-from uas_coverage_env.scenario import MissionSource, ScenarioLike
+from uas_coverage_env.scenario import MissionSource
+from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import FLYING, LANDED, SWAPPING
 
 _MOVING_MPS = 20.0
 

@@ -1,12 +1,6 @@
 """What a learner is paid for: named terms, each with a weight."""
 
-from uas_coverage_env.env.rewards.term import RewardTerm, weights_of
-from uas_coverage_env.env.rewards.terms import REWARD, REWARD_TERMS, rewards_table
+from uas_coverage_env.env.rewards.term import RewardTerm
+from uas_coverage_env.env.rewards.terms import REWARD
 
-__all__ = [
-    "REWARD",
-    "REWARD_TERMS",
-    "RewardTerm",
-    "rewards_table",
-    "weights_of",
-]
+__all__ = ["REWARD", "RewardTerm"]

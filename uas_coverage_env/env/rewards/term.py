@@ -43,6 +43,16 @@ class RewardTerm:
     def __post_init__(self) -> None:
         check_parameters(f"reward term {self.name}", self.parameters)
 
+    @property
+    def size(self) -> int:
+        """It is one number."""
+        return 1
+
+    @property
+    def kernels(self) -> tuple[Any, ...]:
+        """What computes it."""
+        return (self.value,)
+
 
 def weights_of(
     terms: Sequence[RewardTerm], given: Mapping[str, float] | None

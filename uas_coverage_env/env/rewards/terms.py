@@ -4,9 +4,10 @@ import math
 from collections.abc import Sequence
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
+from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.entities.outcome import NONE
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env.rewards.term import RewardTerm
-from uas_coverage_env.world import FLYING, VELOCITY
 from uas_coverage_env.world.contacts import flew_judged_wrench
 
 

@@ -13,35 +13,19 @@ from pathlib import Path
 from typing import Any
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.files.plain_files import read_bytes
+from uas_coverage_env.operations.logs import messages as M
 from uas_coverage_env.operations.logs.logged import Logged
-from uas_coverage_env.operations.logs.mavlink import opened
-from uas_coverage_env.operations.logs.streams import (
-    UNKNOWN,
-    Armed,
-    Attitude,
-    Fact,
-    Glitch,
-    InAir,
-    Message,
-    Messages,
-    Position,
-    Power,
-    Streams,
-    Text,
-    facts_of_text,
-)
+from uas_coverage_env.operations.logs.telemetry import opened
 
-MOST_BYTES = 500_000_000
 _FMT, _FMT_BYTES, _HEAD = 0x80, 89, b"\xa3\x95"
 
 _LAST_BYTES = 256
 
-EVENTS: dict[int, Fact] = {
-    10: Armed(True, is_change=True),
-    11: Armed(False, is_change=True),
-    18: InAir(False),
-    28: InAir(True),
+EVENTS: dict[int, M.Fact] = {
+    10: M.Armed(True, is_change=True),
+    11: M.Armed(False, is_change=True),
+    18: M.InAir(False),
+    28: M.InAir(True),
 }
 """`EV.Id` -> what it says: armed, disarmed, landed, not landed. 15, AUTO_ARMED, is no arming:
 Copter 4.7 says it again and again after it has disarmed, where it may take off in AUTO."""
@@ -61,66 +45,73 @@ _GPS, _GPS_GLITCH = 11, 2
 """`ERR.Subsys` of satellite navigation, and its code of a glitch; 0: it is over."""
 
 
-def _power(monitor: int, m: Any) -> list[Fact]:
+def _power(monitor: int, m: Any) -> list[M.Fact]:
     values = []
     for name, unit in (("Volt", 1.0), ("Curr", 1.0), ("CurrTot", 1e-3)):
-        value = float(getattr(m, name, UNKNOWN))
+        value = float(getattr(m, name, M.UNKNOWN))
         if name != "CurrTot" and name in m.fmt.columns:
             whole = m.fmt.format[m.fmt.columns.index(name)] == "h"
             value *= 0.01 if whole else 1.0
         values.append(unit * value)
-    return [Power(monitor, 0, *values)]
+    return [M.Power(monitor, 0, *values)]
 
 
 def _monitor(m: Any) -> int:
     return int(getattr(m, "Inst", getattr(m, "Instance", 0)))
 
 
-def _error(m: Any) -> list[Fact]:
+def _error(m: Any) -> list[M.Fact]:
     if m.Subsys == _GPS and m.ECode in (0, _GPS_GLITCH):
-        return [Glitch(m.ECode == _GPS_GLITCH)]
+        return [M.Glitch(m.ECode == _GPS_GLITCH)]
     told = ERRORS.get(m.Subsys) if m.ECode else None
-    return [Text(told)] if told else []
+    return [M.Text(told)] if told else []
 
 
-MESSAGES: Messages = {
-    "POS": Message(
+def _height_m(m: Any) -> float:
+    return getattr(m, "RelHomeAlt", getattr(m, "RelAlt", M.UNKNOWN))
+
+
+def _ids(kind: type) -> str:
+    """The events that say such a thing."""
+    return ", ".join(str(number) for number, fact in EVENTS.items() if isinstance(fact, kind))
+
+
+MESSAGES: M.Messages = {
+    "POS": M.Message(
         "position, height above home",
-        lambda m: [Position(m.Lat, m.Lng, getattr(m, "RelHomeAlt", getattr(m, "RelAlt", UNKNOWN)))],
+        lambda m: [
+            M.Position(m.Lat, m.Lng, getattr(m, "RelHomeAlt", getattr(m, "RelAlt", M.UNKNOWN)))
+        ],
     ),
-    "ATT": Message(
-        "attitude", lambda m: [Attitude(*(math.radians(a) for a in (m.Roll, m.Pitch, m.Yaw)))]
+    "ATT": M.Message(
+        "attitude", lambda m: [M.Attitude(*(math.radians(a) for a in (m.Roll, m.Pitch, m.Yaw)))]
     ),
-    "BAT": Message("battery, by `Inst` or `Instance`", lambda m: _power(_monitor(m), m)),
-    "BAT2": Message("second battery", lambda m: _power(1, m)),
-    "CURR": Message("battery", lambda m: _power(0, m)),
-    "CURR2": Message("second battery", lambda m: _power(1, m)),
-    "ARM": Message("armed, disarmed", lambda m: [Armed(bool(m.ArmState), is_change=True)]),
-    "EV": Message(
-        f"armed, disarmed ({', '.join(str(n) for n, f in EVENTS.items() if isinstance(f, Armed))}"
-        f"), landed or not ({', '.join(str(n) for n, f in EVENTS.items() if isinstance(f, InAir))}"
-        ")",
+    "BAT": M.Message("battery, by `Inst` or `Instance`", lambda m: _power(_monitor(m), m)),
+    "BAT2": M.Message("second battery", lambda m: _power(1, m)),
+    "CURR": M.Message("battery", lambda m: _power(0, m)),
+    "CURR2": M.Message("second battery", lambda m: _power(1, m)),
+    "ARM": M.Message("armed, disarmed", lambda m: [M.Armed(bool(m.ArmState), is_change=True)]),
+    "EV": M.Message(
+        f"armed, disarmed ({_ids(M.Armed)}), landed or not ({_ids(M.InAir)})",
         lambda m: [EVENTS[m.Id]] if m.Id in EVENTS else [],
     ),
-    "ERR": Message(f"GPS glitch; {', '.join(ERRORS.values())}", _error),
-    "MSG": Message("GPS glitch, failsafes", lambda m: facts_of_text(str(m.Message))),
+    "ERR": M.Message(f"GPS glitch; {', '.join(ERRORS.values())}", _error),
+    "MSG": M.Message("GPS glitch, failsafes", lambda m: M.facts_of_text(str(m.Message))),
 }
 
 
-def read_bin(path: Path, battery: int | None) -> list[Logged]:
+def read_bin(path: Path, content: bytes, battery: int | None) -> list[Logged]:
     """A data flash log of ArduPilot.
 
     Args:
         path: The file.
+        content: What it holds.
         battery: Which monitor, from 1 on; None: the first that there is.
 
     Raises:
-        InputError: It cannot be read, or holds no position.
+        InputError: It holds no position.
     """
-    content = read_bytes(path, MOST_BYTES)
-    if not content:
-        raise InputError(f"{path}: is empty")
-    streams = Streams()
+    streams = M.MessageStreams()
     whole, dropped = _undamaged(content)
     if not whole:
         raise InputError(f"{path}: holds no position (POS); is it the log of a flight?")
@@ -133,7 +124,7 @@ def read_bin(path: Path, battery: int | None) -> list[Logged]:
             source = Path(name)
             with os.fdopen(descriptor, "wb") as file:
                 file.write(whole)
-        with opened(path, source) as log:
+        with opened(source) as log:
             while (message := log.recv_match(type=list(MESSAGES))) is not None:
                 facts = MESSAGES[message.get_type()].facts(message)
                 streams.add(float(message._timestamp), facts)

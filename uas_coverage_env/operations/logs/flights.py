@@ -12,7 +12,7 @@ import numpy as np
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.logs.logged import Logged, Span
 
-LIFT_M = 0.5
+OFF_GROUND_M = 0.5
 """Above where it stood, a UAS has taken off."""
 
 RISE_M = 1.0
@@ -90,7 +90,7 @@ def chosen_flight(log: Logged, number: int | None) -> LoggedFlight:
 
 
 def _flight_of_table(log: Logged) -> LoggedFlight | None:
-    up = np.flatnonzero(log.height_m > LIFT_M)
+    up = np.flatnonzero(log.height_m > OFF_GROUND_M)
     if not len(up):
         return None
     first, last = max(up[0] - 1, 0), min(up[-1] + 1, len(log.time_s) - 1)
@@ -115,7 +115,7 @@ def _armed_flight(log: Logged, span: Span) -> LoggedFlight | None:
     ]
     if rises_m.max() < RISE_M:
         return None
-    take_off_s = float(times_s[max(int((rises_m > LIFT_M).argmax()) - 1, 0)])
+    take_off_s = float(times_s[max(int((rises_m > OFF_GROUND_M).argmax()) - 1, 0)])
     down = bool(air) and not air[-1].is_open
     ends_s = air[-1].ends_s if down else span.ends_s
     in_flight = armed & (log.time_s <= ends_s)

@@ -15,23 +15,9 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.files.plain_files import read_bytes
+from uas_coverage_env.operations.logs import messages as M
 from uas_coverage_env.operations.logs.logged import Logged
-from uas_coverage_env.operations.logs.streams import (
-    UNKNOWN,
-    Armed,
-    Attitude,
-    Fact,
-    InAir,
-    Message,
-    Messages,
-    Position,
-    Power,
-    Streams,
-    facts_of_text,
-)
 
-_MOST_BYTES = 500_000_000
 _EARTH_M = 6_371_000.0
 _GLOBAL, _LOCAL = "vehicle_global_position", "vehicle_local_position"
 _ARMED = 2
@@ -42,7 +28,7 @@ _HOME_ALT = "home_alt"
 """What is added to a row of a position: the altitude of home at that time [m]."""
 
 
-def _local(m: Row) -> list[Fact]:
+def _local(m: Row) -> list[M.Fact]:
     """PX4's map: azimuthal equidistant on a sphere."""
     ahead, aside = m["x"] / _EARTH_M, m["y"] / _EARTH_M
     far = math.hypot(ahead, aside)
@@ -54,13 +40,13 @@ def _local(m: Row) -> list[Fact]:
     below = math.cos(far) * math.cos(ref) - ahead * scale * math.sin(ref)
     longitude = east + math.atan2(aside * scale, below)
     height_m = m["ref_alt"] - m["z"] - m[_HOME_ALT]
-    return [Position(math.degrees(latitude), math.degrees(longitude), height_m)]
+    return [M.Position(math.degrees(latitude), math.degrees(longitude), height_m)]
 
 
-def _attitude(m: Row) -> list[Fact]:
+def _attitude(m: Row) -> list[M.Fact]:
     w, x, y, z = (m[f"q[{k}]"] for k in range(4))
     return [
-        Attitude(
+        M.Attitude(
             math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
             math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))),
             math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
@@ -68,13 +54,13 @@ def _attitude(m: Row) -> list[Fact]:
     ]
 
 
-def _power(m: Row) -> list[Fact]:
+def _power(m: Row) -> list[M.Fact]:
     def known(least: float, unit: float, *names: str) -> float:
-        value = next((float(m[name]) for name in names if name in m), UNKNOWN)
-        return unit * value if value >= least else UNKNOWN
+        value = next((float(m[name]) for name in names if name in m), M.UNKNOWN)
+        return unit * value if value >= least else M.UNKNOWN
 
     return [
-        Power(
+        M.Power(
             m["multi_id"],
             0,
             voltage_V=known(1e-3, 1.0, "voltage_v", "voltage_filtered_v"),
@@ -85,46 +71,41 @@ def _power(m: Row) -> list[Fact]:
     ]
 
 
-MESSAGES: Messages = {
-    "vehicle_global_position": Message(
-        "position", lambda m: [Position(m["lat"], m["lon"], m["alt"] - m[_HOME_ALT])]
+MESSAGES: M.Messages = {
+    "vehicle_global_position": M.Message(
+        "position", lambda m: [M.Position(m["lat"], m["lon"], m["alt"] - m[_HOME_ALT])]
     ),
-    "vehicle_local_position": Message("position, where the global one is not logged", _local),
-    "home_position": Message("altitude of home", lambda m: []),
-    "vehicle_gps_position": Message("time of the satellites", lambda m: []),
-    "vehicle_attitude": Message("attitude", _attitude),
-    "battery_status": Message("batteries, by instance", _power),
-    "vehicle_status": Message(
-        "armed, disarmed (`arming_state`)", lambda m: [Armed(m["arming_state"] == _ARMED)]
+    "vehicle_local_position": M.Message("position, where the global one is not logged", _local),
+    "home_position": M.Message("altitude of home", lambda m: []),
+    "vehicle_gps_position": M.Message("time of the satellites", lambda m: []),
+    "vehicle_attitude": M.Message("attitude", _attitude),
+    "battery_status": M.Message("batteries, by instance", _power),
+    "vehicle_status": M.Message(
+        "armed, disarmed (`arming_state`)", lambda m: [M.Armed(m["arming_state"] == _ARMED)]
     ),
-    "vehicle_land_detected": Message("landed or not", lambda m: [InAir(not m["landed"])]),
+    "vehicle_land_detected": M.Message("landed or not", lambda m: [M.InAir(not m["landed"])]),
 }
 """Topic -> what is read of it; texts that were logged are read, too."""
 
-TEXTS = Message("GPS glitch, failsafes", lambda m: facts_of_text(m))
+TEXTS = M.Message("GPS glitch, failsafes", lambda m: M.facts_of_text(m))
 
 
-def read_ulg(path: Path, battery: int | None) -> list[Logged]:
+def read_ulg(path: Path, content: bytes, battery: int | None) -> list[Logged]:
     """A log of PX4.
 
     Args:
         path: The file.
+        content: What it holds.
         battery: Which monitor, from 1 on; None: the first that there is.
 
     Raises:
-        InputError: It cannot be read, or holds no position.
+        InputError: It holds no position, or lacks a field.
     """
     from pyulog import ULog
 
-    content = read_bytes(path, _MOST_BYTES)
-    if not content:
-        raise InputError(f"{path}: is empty")
-    try:
-        with redirect_stdout(io.StringIO()):  # it prints what is damaged
-            log: Any = ULog(io.BytesIO(content), list(MESSAGES))
-    except Exception as error:  # its parser raises whatever a damaged file makes it
-        raise InputError(f"{path}: cannot be read as a log: {error}") from error
-    streams = Streams()
+    with redirect_stdout(io.StringIO()):  # it prints what is damaged
+        log: Any = ULog(io.BytesIO(content), list(MESSAGES))
+    streams = M.MessageStreams()
     if log.file_corruption:
         streams.notes.append("parts of its log are damaged, and were passed over")
     topics: dict[str, list[Any]] = {}
@@ -160,7 +141,7 @@ def _rows(topic: Any, home_alt: Callable[[Any], Any]) -> Iterator[tuple[float, d
         yield 1e-6 * time_us, {**row, "multi_id": topic.multi_id}
 
 
-def _home_alt(topics: Mapping[str, list[Any]], streams: Streams) -> Callable[[Any], Any]:
+def _home_alt(topics: Mapping[str, list[Any]], streams: M.MessageStreams) -> Callable[[Any], Any]:
     """The altitude of home at times (N,) as it was set last, or will be first [m]."""
     for name, field, instead in (
         ("home_position", "alt", ""),

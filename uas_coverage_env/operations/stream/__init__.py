@@ -1,19 +1,7 @@
 """A plan flown in time: position targets that a companion computer sends to autopilots."""
 
 from uas_coverage_env.operations.stream.clock import Clock, RealClock
-from uas_coverage_env.operations.stream.companion import Companion, Ended, StreamOptions
-from uas_coverage_env.operations.stream.flight import stream_flight
-from uas_coverage_env.operations.stream.link import VehicleLink
-from uas_coverage_env.operations.stream.timeline import Timeline, timeline_of
+from uas_coverage_env.operations.stream.companion import Ended, StreamOptions
+from uas_coverage_env.operations.stream.run_stream import stream_flight
 
-__all__ = [
-    "Clock",
-    "Companion",
-    "Ended",
-    "RealClock",
-    "StreamOptions",
-    "Timeline",
-    "VehicleLink",
-    "stream_flight",
-    "timeline_of",
-]
+__all__ = ["Clock", "Ended", "RealClock", "StreamOptions", "stream_flight"]

@@ -16,16 +16,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.operations.stream.around import Around
 from uas_coverage_env.operations.stream.fleet import Fleet, GivenUpError
 from uas_coverage_env.operations.stream.giving_up import NOTHING_TOLD, GivingUp
-from uas_coverage_env.operations.stream.limits import Limits
 from uas_coverage_env.operations.stream.link import VehicleLink
-from uas_coverage_env.operations.stream.pace import Pace
-from uas_coverage_env.operations.stream.ready import Failsafes, meet, read_limits, take_off
+from uas_coverage_env.operations.stream.preflight import Failsafes, meet, read_limits, take_off
 from uas_coverage_env.operations.stream.rejoin import WayBack
+from uas_coverage_env.operations.stream.slowdowns import TROUBLES
+from uas_coverage_env.operations.stream.surroundings import SwarmSurroundings
+from uas_coverage_env.operations.stream.time_scaling import Pace
 from uas_coverage_env.operations.stream.timeline import Timeline
-from uas_coverage_env.operations.stream.troubles import TROUBLES
+from uas_coverage_env.operations.stream.vehicle_limits import Limits
 
 FloatArray = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ class Companion:
         self,
         plans: Mapping[str, Timeline],
         fleet: Fleet,
-        around: Around,
+        around: SwarmSurroundings,
         options: StreamOptions,
         may_hurry: bool,
         check: Callable[[Pace, Mapping[str, Limits]], None],
@@ -229,8 +229,7 @@ class Companion:
             elif name in self._back:
                 others_m = self._fleet.others_m(name)
                 self._back[name].go_on(
-                    *(link, plan, self.plan_s, self._around, others_m, passed_s),
-                    stands=rate == 0.0,
+                    *(link, plan, self.plan_s, self._around, others_m, passed_s), stands=rate == 0.0
                 )
                 if self._back[name].is_there:
                     del self._back[name]

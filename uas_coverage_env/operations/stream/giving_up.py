@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.operations.stream.around import Around
 from uas_coverage_env.operations.stream.failsafes import PATIENCE_S
 from uas_coverage_env.operations.stream.fleet import AGAIN_S, Fleet
-from uas_coverage_env.operations.stream.limits import Limits
 from uas_coverage_env.operations.stream.link import VehicleLink
-from uas_coverage_env.operations.stream.ready import stands
+from uas_coverage_env.operations.stream.preflight import stands
+from uas_coverage_env.operations.stream.surroundings import SwarmSurroundings
+from uas_coverage_env.operations.stream.vehicle_limits import Limits
 
 FloatArray = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ class GivingUp:
     def __init__(
         self,
         fleet: Fleet,
-        around: Around,
+        around: SwarmSurroundings,
         limits: Mapping[str, Limits],
         homes_m: Mapping[str, FloatArray],
         reaction: str,
@@ -174,10 +174,7 @@ class GivingUp:
             others_m = self._fleet.others_m(link.name)
             clear["land"] = self._around.may_land(link.name, link.place_m, others_m)
             clear["rtl"] = self._around.goes_straight_home(
-                link.name,
-                link.place_m,
-                self._homes_m[link.name],
-                self._limits[link.name].return_m,
+                link.name, link.place_m, self._homes_m[link.name], self._limits[link.name].return_m
             )
         return [mode for mode in REACTIONS[self._reaction].modes if clear.get(mode)]
 

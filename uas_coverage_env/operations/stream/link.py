@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
-from uas_coverage_env.operations.frame import LocalFrame
+from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.stream.autopilots import ARDUPILOT, AUTOPILOTS, Name
 from uas_coverage_env.operations.stream.failsafes import STATION
 
@@ -193,7 +193,7 @@ class VehicleLink:
         velocity = (float(value) for value in velocity_mps)
         self._link.mav.set_position_target_global_int_send(
             0, self._addressee, 1, _RELATIVE_FRAME, _TYPE_MASK, *whole, height,
-            *velocity, 0.0, 0.0, 0.0, 0.0, 0.0,
+            *velocity, 0.0, 0.0, 0.0, 0.0, 0.0
         )  # fmt: skip
 
     def close(self) -> None:

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.operations.stream.around import Around
 from uas_coverage_env.operations.stream.link import VehicleLink
+from uas_coverage_env.operations.stream.surroundings import SwarmSurroundings
 from uas_coverage_env.operations.stream.timeline import Timeline
 
 FloatArray = NDArray[np.float64]
@@ -43,7 +43,7 @@ class WayBack:
         link: VehicleLink,
         plan: Timeline,
         plan_s: float,
-        around: Around,
+        around: SwarmSurroundings,
         others_m: Mapping[str, FloatArray],
         passed_s: float,
         *,
@@ -94,7 +94,7 @@ def _clear_way(
     link: VehicleLink,
     plan: Timeline,
     plan_s: float,
-    around: Around,
+    around: SwarmSurroundings,
     others_m: Mapping[str, FloatArray],
 ) -> list[FloatArray]:
     """Places on the way straight to its place, or else by its path; empty: neither is clear."""

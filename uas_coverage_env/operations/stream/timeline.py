@@ -9,8 +9,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.record import LANDED
-from uas_coverage_env.operations.tracks import LIFT_M
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 FloatArray = NDArray[np.float64]
 
@@ -87,11 +87,11 @@ def timeline_of(flight: Flight, uas: int) -> Timeline | None:
     """
     flying = np.flatnonzero(flight.mode[:, uas] < LANDED)
     x = flight.x[: flying[-1] + 1, uas] if len(flying) else np.empty((0, VZ + 1))
-    low = -x[:, 2] < LIFT_M
+    low = -x[:, 2] < TAKE_OFF_HEIGHT_M
     if low.all():
         return None
     places_m, velocities_mps = x[:, :3].copy(), x[:, VX : VZ + 1].copy()
-    places_m[low, 2], velocities_mps[low, 2] = -LIFT_M, 0.0
+    places_m[low, 2], velocities_mps[low, 2] = -TAKE_OFF_HEIGHT_M, 0.0
     # over its places of take-off and landing it would only stand
     away = [np.hypot(*(places_m - places_m[end])[:, :2].T) > _SAME_M for end in (0, -1)]
     begins = max(int((~low | away[0]).argmax()) - 1, 0)

@@ -1,9 +1,9 @@
 """Figures for print, drawn with matplotlib (extra `view`): of a flight, and of trainings.
 
-A new figure of a flight is one file with a function `flight -> Figure`, and one line in `KINDS`.
+A new figure of a flight is one file with a function `flight -> Figure`, and one line in
+`figure_kinds.KINDS`.
 """
 
-from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
@@ -11,47 +11,21 @@ from matplotlib.figure import Figure
 
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.figures.battery import battery_figure, published_battery
 from uas_coverage_env.replay.figures.decision_time import decision_time_figure
 from uas_coverage_env.replay.figures.map import map_figure
 from uas_coverage_env.replay.figures.modes import modes_figure
-from uas_coverage_env.replay.figures.style import WIDTH_IN, look, printed
-from uas_coverage_env.replay.figures.training import (
-    BASELINES,
-    CURVE,
-    Curve,
-    baseline_curves,
-    learning_curve,
-    training_figure,
-    with_baselines,
-)
-
-KINDS: dict[str, Callable[[Flight], Figure]] = {
-    "map": map_figure,
-    "battery": battery_figure,
-    "modes": modes_figure,
-    "decision-time": decision_time_figure,
-}
+from uas_coverage_env.replay.figures.style import printed
+from uas_coverage_env.replay.figures.training import training_figure
 
 __all__ = [
-    "BASELINES",
-    "CURVE",
-    "KINDS",
-    "WIDTH_IN",
-    "Curve",
-    "baseline_curves",
     "battery_figure",
     "decision_time_figure",
-    "learning_curve",
-    "look",
     "map_figure",
     "modes_figure",
-    "png_of",
     "published_battery",
     "save_figure",
     "training_figure",
-    "with_baselines",
 ]
 
 

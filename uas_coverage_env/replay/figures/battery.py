@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from uas_coverage_env.draw import colours
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.figures.style import (
     MANY,
@@ -18,6 +19,7 @@ from uas_coverage_env.replay.figures.style import (
     line_style,
     printed,
     rows,
+    shade,
     uas_colour,
 )
 
@@ -55,7 +57,7 @@ def battery_figure(flight: Flight, *, published: bool | None = None) -> Figure:
             axis.set_ylabel(label)
             axis.margins(x=0.01)
         for floor in sorted({1.0 - uas.dod_max for uas in flight.scenario.uas}):
-            axes[0].axhline(100 * floor, color="#c81e2d", linewidth=0.8, linestyle=":")
+            axes[0].axhline(100 * floor, color=shade(colours.RED), linewidth=0.8, linestyle=":")
         axes[0].set_ylim(bottom=0)
         axes[-1].set_xlabel("Time, s")
         figure.align_ylabels(axes)
@@ -134,7 +136,9 @@ def _span_legend(flight: Flight) -> list[Artist]:
 
 
 def _other_legend(published: bool) -> list[Artist]:
-    limit = Line2D([], [], color="#c81e2d", linestyle=":", linewidth=0.8, label="lowest allowed")
+    limit = Line2D(
+        [], [], color=shade(colours.RED), linestyle=":", linewidth=0.8, label="lowest allowed"
+    )
     style = {"color": _GREY, "linewidth": _BREADTH}
     theirs = [
         Line2D([], [], **style, linestyle=line_style(i), label=f"UAS {i + 1}, Gasche et al.")

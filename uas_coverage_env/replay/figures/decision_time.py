@@ -1,14 +1,21 @@
 """How long the planner took for each decision, over time and as a distribution."""
 
+from typing import Any
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
+from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.replay.figures.style import printed, shade, width_in
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 _MILLISECONDS_BELOW_S = 0.1
 _WIDE_IN = 4.5
@@ -31,6 +38,8 @@ def decision_time_figure(flight: Flight) -> Figure:
     fast = later_s < _MILLISECONDS_BELOW_S
     unit, scale = ("ms", 1e3) if fast else ("s", 1.0)
     times_s = flight.time_s[: len(durations_s)]
+    given = flight.planner_options.get("time_limit_s")
+    limit_s = float(given) if isinstance(given, int | float) and np.isfinite(given) else 0.0
     with printed():
         wide = width_in() >= _WIDE_IN
         figure = Figure(figsize=(width_in(), 2.7 if wide else 4.4), layout="constrained")
@@ -39,58 +48,46 @@ def decision_time_figure(flight: Flight) -> Figure:
         else:
             series, shares = figure.subplots(2, 1, sharey=True)
             shares.set_ylabel(f"Decision time, {unit}")
-        ink = shade(colours.BLUE)
-        series.plot(times_s, scale * durations_s, color=ink, linewidth=0.6, alpha=0.5)
-        series.plot(times_s, scale * durations_s, "o", color=ink, markersize=2.2)
-        if fallback.any():
-            series.plot(
-                times_s[fallback],
-                scale * durations_s[fallback],
-                "x",
-                color=shade(colours.VERMILLION),
-                label=f"on a fallback ({fallback.sum()})",
-            )
-            series.legend(loc="lower left")
+        _draw_series(series, times_s, scale * durations_s, fallback)
         series.set(xlabel="Time of flight, s", ylabel=f"Decision time, {unit}")
-        ordered = np.sort(scale * durations_s)
-        shares.plot(np.arange(1, len(ordered) + 1) / len(ordered), ordered, color=ink)
-        for percent in (50, 99):
-            value = float(np.percentile(ordered, percent))
-            shares.plot(percent / 100, value, "o", color=ink, markersize=3.5)
-            shares.annotate(
-                f"{percent} %: {three_digits(value)}",
-                (percent / 100, value),
-                xytext=(-6, 5),
-                textcoords="offset points",
-                ha="right",
-                fontsize=8,
-            )
-        shares.xaxis.set_major_formatter(PercentFormatter(1.0))
-        shares.set(xlabel="Share of decisions", xlim=(0, 1.02))
-        given = flight.planner_options.get("time_limit_s")
-        limit_s = float(given) if isinstance(given, int | float) and np.isfinite(given) else 0.0
+        _draw_shares(shares, np.sort(scale * durations_s))
         if limit_s > 0.0:
-            for axis in (series, shares):
-                axis.axhline(scale * limit_s, color=shade(colours.RED), linewidth=0.8, ls=":")
-            series.annotate(
-                "limit",
-                (1.0, scale * limit_s),
-                xycoords=("axes fraction", "data"),
-                xytext=(-2, 3),
-                textcoords="offset points",
-                ha="right",
-                fontsize=8,
-            )
-        shown_s = later_s if durations_s[0] > _OFF_SCALE * later_s else durations_s.max()
-        drawn = scale * max(float(shown_s), limit_s)
-        series.set_ylim(bottom=0, top=1.12 * drawn)
-        if durations_s[0] > _OFF_SCALE * later_s:
-            series.annotate(
-                f"first: {three_digits(scale * durations_s[0])} {unit} ↑",
-                (0.0, 1.0),
-                xycoords="axes fraction",
-                xytext=(6, -9),
-                textcoords="offset points",
-                fontsize=8,
-            )
+            for axes in (series, shares):
+                axes.axhline(scale * limit_s, color=shade(colours.RED), linewidth=0.8, ls=":")
+            place = {"xycoords": ("axes fraction", "data"), "xytext": (-2, 3), "ha": "right"}
+            _say(series, "limit", (1.0, scale * limit_s), **place)
+        off_scale = durations_s[0] > _OFF_SCALE * later_s
+        shown_s = later_s if off_scale else durations_s.max()
+        series.set_ylim(bottom=0, top=1.12 * scale * max(float(shown_s), limit_s))
+        if off_scale:
+            words = f"first: {three_digits(scale * durations_s[0])} {unit} ↑"
+            _say(series, words, (0.0, 1.0), xycoords="axes fraction", xytext=(6, -9))
     return figure
+
+
+def _draw_series(axes: Axes, times_s: FloatArray, times: FloatArray, fallback: BoolArray) -> None:
+    ink = shade(colours.BLUE)
+    axes.plot(times_s, times, color=ink, linewidth=0.6, alpha=0.5)
+    axes.plot(times_s, times, "o", color=ink, markersize=2.2)
+    if fallback.any():
+        label = f"on a fallback ({fallback.sum()})"
+        ink = shade(colours.VERMILLION)
+        axes.plot(times_s[fallback], times[fallback], "x", color=ink, label=label)
+        axes.legend(loc="lower left")
+
+
+def _draw_shares(axes: Axes, ordered: FloatArray) -> None:
+    ink = shade(colours.BLUE)
+    axes.plot(np.arange(1, len(ordered) + 1) / len(ordered), ordered, color=ink)
+    for percent in (50, 99):
+        value = float(np.percentile(ordered, percent))
+        axes.plot(percent / 100, value, "o", color=ink, markersize=3.5)
+        place = percent / 100, value
+        _say(axes, f"{percent} %: {three_digits(value)}", place, xytext=(-6, 5), ha="right")
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.set(xlabel="Share of decisions", xlim=(0, 1.02))
+
+
+def _say(axes: Axes, words: str, place: tuple[float, float], **how: Any) -> None:
+    """Words beside a place, by so many points."""
+    axes.annotate(words, place, textcoords="offset points", fontsize=8, **how)

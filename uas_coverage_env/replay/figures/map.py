@@ -14,8 +14,13 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.labels import Box, free_place, overlap, short_name
+from uas_coverage_env.draw.marks import heavy_waypoints
+from uas_coverage_env.draw.terrain import height_words
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import MODES, Flight, SceneHistory, SeenGround, seen_ground
+from uas_coverage_env.flight import MODES, Flight, seen_ground
+from uas_coverage_env.flight.scene_history import SceneHistory
+from uas_coverage_env.flight.seen import SeenGround
+from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.replay.figures.map_legend import LANDED, LOST, SEEN_ALPHA, legend_of
 from uas_coverage_env.replay.figures.style import (
     MANY,
@@ -26,9 +31,8 @@ from uas_coverage_env.replay.figures.style import (
     width_in,
     words_colour,
 )
-from uas_coverage_env.replay.outline import outline_of
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.vehicle import PSI
+from uas_coverage_env.vehicle.layout import PSI
 
 _LEGEND_IN = 0.2
 _LEGEND_ROW_IN = 0.175
@@ -116,7 +120,7 @@ def _flat(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _terrain(axes: Axes, scenario: Scenario) -> None:
-    fence = _flat(outline_of(scenario.fence))
+    fence = _flat(outline_of(scenario.fence.vertices_m))
     axes.add_patch(Polygon(fence, facecolor=shade(colours.GROUND), edgecolor="none"))
     for item in scenario.decorations:
         tint = colours.of_decoration(item.kind)
@@ -125,7 +129,7 @@ def _terrain(axes: Axes, scenario: Scenario) -> None:
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
         tint = colours.of_obstacle(obstacle.kind)
         edge = shade(colours.shaded(tint, 0.6))
-        corners = _flat(outline_of(hull))
+        corners = _flat(outline_of(hull.vertices_m))
         axes.add_patch(Polygon(corners, facecolor=shade(tint), edgecolor=edge, linewidth=0.6))
     axes.add_patch(Polygon(fence, fill=False, edgecolor=shade(colours.INK), linewidth=1.2))
 
@@ -144,12 +148,12 @@ def _seen_ground(axes: Axes, seen: Sequence[SeenGround]) -> None:
 
 
 def _waypoints(axes: Axes, scenario: Scenario, covered: NDArray[np.bool_], m_per_pt: float) -> None:
-    lightest = min((waypoint.weight for waypoint in scenario.waypoints), default=1.0)
-    for waypoint, done in zip(scenario.waypoints, covered, strict=True):
+    heavy = heavy_waypoints(scenario)
+    for waypoint, weighs_more, done in zip(scenario.waypoints, heavy, covered, strict=True):
         x, y = waypoint.position_m[1], waypoint.position_m[0]
         edge = shade(colours.COVERED_EDGE if done else colours.INK)
         # a ring in a ring counts more
-        radii = [waypoint.radius_m, *([0.82 * waypoint.radius_m] * (waypoint.weight > lightest))]
+        radii = [waypoint.radius_m, *([0.82 * waypoint.radius_m] * weighs_more)]
         for radius in radii:
             axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=edge, linewidth=0.7))
         if done:
@@ -168,9 +172,9 @@ def _heights(
     ).reshape(-1, 3)
     heights = []
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-        words = f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
+        words = height_words(hull)
         box_m = m_per_pt * _LABEL_PT * np.array([_LETTER * len(words), 1.1])
-        place = free_place(_flat(outline_of(hull)), box_m, discs_m)
+        place = free_place(_flat(outline_of(hull.vertices_m)), box_m, discs_m)
         if place is not None:
             tint = colours.of_obstacle(obstacle.kind)
             heights.append((place, words, shade(colours.shaded(tint, 0.35))))

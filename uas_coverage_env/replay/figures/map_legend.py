@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.signs import decoration_kinds, in_words, obstacle_kinds
-from uas_coverage_env.flight import MODES, Flight, SeenGround
+from uas_coverage_env.flight import MODES, Flight
+from uas_coverage_env.flight.seen import SeenGround
 from uas_coverage_env.replay.figures.style import shade, uas_colour
 from uas_coverage_env.scenario import Scenario
 

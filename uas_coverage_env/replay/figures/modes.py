@@ -1,7 +1,5 @@
 """What each UAS was doing when, under the coverage reached until then."""
 
-import itertools
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,14 +9,10 @@ from uas_coverage_env.draw import colours
 from uas_coverage_env.flight import MODES, Flight
 from uas_coverage_env.flight.metrics import open_waypoints
 from uas_coverage_env.replay.figures.style import columns_of, printed, rows, shade
+from uas_coverage_env.replay.runs import mode_runs
 
-_PAINT = {
-    "covering": (colours.BLUE, ""),
-    "transit": (colours.ORANGE, "///"),
-    "return": ((217, 154, 192), "..."),
-    "landed": ((205, 205, 200), ""),
-    "lost": (colours.RED, "xxx"),
-}
+_HATCHES = {"covering": "", "transit": "///", "return": "...", "landed": "", "lost": "xxx"}
+_PAINT = {mode: (colours.MODES[mode], hatch) for mode, hatch in _HATCHES.items()}
 
 _MOST_BARS = 16
 
@@ -48,8 +42,10 @@ def modes_figure(flight: Flight) -> Figure:
 
 def _draw_bars(bars: Axes, flight: Flight) -> None:
     names = flight.names
-    for i, mode, start_s, end_s in _runs(flight):
-        colour, hatch = _PAINT[mode]
+    every = [(i, *run) for i in range(len(names)) for run in mode_runs(flight, i)]
+    for i, mode, first, after in every:
+        colour, hatch = _PAINT[MODES[mode]]
+        start_s, end_s = flight.time_s[[first, after]].tolist()
         bars.barh(
             i,
             end_s - start_s,
@@ -80,17 +76,3 @@ def _draw_counts(axes: Axes, flight: Flight) -> None:
     for violation in flight.violations:
         axes.plot(violation.time_s, 0.98 * top, "X", color=shade(colours.RED), mec="white", ms=8)
     axes.set(ylabel="UAS", ylim=(0.0, top))
-
-
-def _runs(flight: Flight) -> list[tuple[int, str, float, float]]:
-    """[(place of the UAS, mode, from [s], to [s])], a run to the sample where the next begins."""
-    result = []
-    end = flight.steps
-    for i in range(len(flight.names)):
-        first = 0
-        for mode, samples in itertools.groupby(flight.mode[:, i].tolist()):
-            count = len(list(samples))
-            start_s, end_s = (flight.time_s[min(k, end)] for k in (first, first + count))
-            result.append((i, MODES[mode], float(start_s), float(end_s)))
-            first += count
-    return result

@@ -150,12 +150,12 @@ def shade(colour: colours.Colour) -> tuple[float, float, float]:
 
 def uas_colour(i: int) -> tuple[float, float, float]:
     """The colour of the UAS at place `i` of the fleet."""
-    return shade(colours.UAS[i % len(colours.UAS)])
+    return shade(colours.of_uas(i))
 
 
 def words_colour(i: int) -> tuple[float, float, float]:
     """The colour of words about that UAS."""
-    return shade(colours.of_words(colours.UAS[i % len(colours.UAS)]))
+    return shade(colours.of_words(colours.of_uas(i)))
 
 
 def line_style(i: int):

@@ -14,8 +14,15 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.plugins.installed import entry_points
 from uas_coverage_env.plugins.users_code import described
 from uas_coverage_env.scenario.families.family import Family, FamilyOfSeeds
-from uas_coverage_env.scenario.families.low_charge import with_charge_for
-from uas_coverage_env.scenario.families.site import Rng, Site, Size, Wanted, grid, outline, prism
+from uas_coverage_env.scenario.families.site import (
+    Rng,
+    Site,
+    Size,
+    Wanted,
+    outline,
+    prism,
+    spread_places,
+)
 from uas_coverage_env.scenario.model import Scenario
 
 GROUP = "uas_coverage.families"
@@ -54,16 +61,4 @@ def _loaded(entry: EntryPoint) -> Family | FamilyOfSeeds:
     return Family(refuse)
 
 
-__all__ = [
-    "GROUP",
-    "Family",
-    "FamilyOfSeeds",
-    "Site",
-    "Size",
-    "Wanted",
-    "grid",
-    "installed_families",
-    "outline",
-    "prism",
-    "with_charge_for",
-]
+__all__ = ["Family", "Site", "Size", "Wanted", "outline", "prism", "spread_places"]

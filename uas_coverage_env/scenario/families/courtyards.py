@@ -41,7 +41,7 @@ def courtyards(rng: Rng, size: Size) -> Scenario:
             yard = f"{len(wanted) + 1}"
             walls += _block(yard, north_m, east_m, yard_m, float(rng.uniform(*_HEIGHT_M)))
             wanted.append(Wanted((north_m, east_m), _YARD_ALTITUDE_M, "yard", 2.0, _YARD_RADIUS_M))
-    places = square.grid(rng, n_waypoints - len(wanted))
+    places = square.spread_places(rng, n_waypoints - len(wanted))
     wanted += [Wanted(place, _STREET_ALTITUDE_M, "street", radius_m=10.0) for place in places]
     return square.site(walls).scenario(rng, f"courtyards-{tag(rng)}", n_uas, wanted, size)
 

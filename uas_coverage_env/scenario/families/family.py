@@ -41,7 +41,7 @@ class Family:
         draw: (rng, size) -> a scenario that it draws with this generator alone.
         size: How large the missions are.
         n_moving: The most moving obstacles that it draws.
-        disturbances: Level of wind and wrong models, see `LEVELS`; None: still air.
+        disturbances: Level of wind and wrong models, see `DISTURBANCE_LEVELS`; None: still air.
 
     Raises:
         ValueError: There is no such level.

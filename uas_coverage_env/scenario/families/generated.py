@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.scenario.families.family import FamilyOfSeeds
 from uas_coverage_env.scenario.families.site import (
     CEILING_M,
-    Range,
+    Between,
     Vertices_m,
     fence_around,
     fleet,
@@ -33,7 +33,7 @@ from uas_coverage_env.scenario.families.site import (
     with_time,
 )
 from uas_coverage_env.scenario.fields import Obstacle, Waypoint
-from uas_coverage_env.scenario.levels import LEVELS, check_level, with_disturbances
+from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS, check_level, with_disturbances
 from uas_coverage_env.scenario.model import Scenario
 from uas_coverage_env.scenario.room import MOVING, SPARE, Room
 
@@ -122,8 +122,8 @@ def generate_scenario(
             of 68 m, or the blocks at one per 55 m x 55 m.
         min_height_m: Least height above ground and roofs but for take-off and landing, at most 10
             [m]. The town is the same whatever it is; waypoints that are too low for it are lifted.
-        disturbances: Level of wind and of wrong models, light, moderate or strong (see `LEVELS`);
-            None: still air and the vehicles as believed. The town is the same in all of them.
+        disturbances: Level of wind and of wrong models, light, moderate or strong; None:
+            still air and the vehicles as believed. The town is the same in all of them.
 
     Raises:
         ValueError: An argument is wrong, or no such scenario can be flown; the line names the
@@ -170,9 +170,9 @@ def generate_scenario(
 
 def sample_scenario(
     seed: int,
-    n_uas: Range = N_UAS,
-    n_waypoints: Range = N_WAYPOINTS,
-    n_obstacles: Range = N_OBSTACLES,
+    n_uas: Between = N_UAS,
+    n_waypoints: Between = N_WAYPOINTS,
+    n_obstacles: Between = N_OBSTACLES,
     min_height_m: float = MIN_HEIGHT_M,
     disturbances: str | None = None,
 ) -> Scenario:
@@ -203,9 +203,9 @@ class GeneratedScenarios(FamilyOfSeeds):
         ValueError: A range is not two whole numbers, the least first, or there is no such level.
     """
 
-    n_uas: Range = N_UAS
-    n_waypoints: Range = N_WAYPOINTS
-    n_obstacles: Range = N_OBSTACLES
+    n_uas: Between = N_UAS
+    n_waypoints: Between = N_WAYPOINTS
+    n_obstacles: Between = N_OBSTACLES
     min_height_m: float = MIN_HEIGHT_M
     disturbances: str | None = None
 
@@ -239,7 +239,7 @@ _TOWNS = GeneratedScenarios()
 FAMILIES = {
     "generated": _TOWNS,
     "town": _TOWNS,  # as generated scenarios are named
-    **{f"generated-{level}": replace(_TOWNS, disturbances=level) for level in LEVELS},
+    **{f"generated-{level}": replace(_TOWNS, disturbances=level) for level in DISTURBANCE_LEVELS},
 }
 
 

@@ -57,7 +57,7 @@ def irregular(rng: Rng, size: Size) -> Scenario:
         )
         return near and empty.clearance_m((north_m, east_m, -_MIDDLE_M)) > MARGIN_M
 
-    places = square.grid(rng, n_waypoints, is_inside)
+    places = square.spread_places(rng, n_waypoints, is_inside)
     houses = [
         _house(rng, k, place)
         for k, place in enumerate(places[:: max(1, round(1.0 / _HOUSES_PER_WAYPOINT))])

@@ -11,7 +11,7 @@ def open_field(rng: Rng, size: Size) -> Scenario:
     """Waypoints on a field without obstacles."""
     n_uas, n_waypoints = size.draw(rng)
     square = Square.at_pitch(n_uas, n_waypoints, _PITCH_M)
-    wanted = [Wanted(place) for place in square.grid(rng, n_waypoints)]
+    wanted = [Wanted(place) for place in square.spread_places(rng, n_waypoints)]
     return square.site().scenario(rng, f"open-field-{tag(rng)}", n_uas, wanted, size)
 
 

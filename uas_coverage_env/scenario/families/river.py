@@ -64,7 +64,7 @@ def river(rng: Rng, size: Size) -> Scenario:
     ]
     wanted += [Wanted(place, kind="forest", weight=2.0) for place, _ in woods]
     wanted = wanted[:n_waypoints]
-    places = square.grid(
+    places = square.spread_places(
         rng,
         max(1, n_waypoints - len(wanted)),
         lambda north, east: abs(east - course_m(north)) > 1.2 * _RIVER_M,

@@ -27,7 +27,7 @@ from uas_coverage_env.scenario.fields import (
 from uas_coverage_env.scenario.model import Scenario
 
 Rng = np.random.Generator
-Range = tuple[int, int]
+Between = tuple[int, int]
 """Least and most."""
 Place_m = tuple[float, float]
 """North and east."""
@@ -66,8 +66,8 @@ class Size:
         vehicles: Vehicles to draw from.
     """
 
-    n_uas: Range = (2, 4)
-    n_waypoints: Range = (20, 40)
+    n_uas: Between = (2, 4)
+    n_waypoints: Between = (20, 40)
     vehicles: tuple[str, ...] = ("s500_v2",)
 
     def draw(self, rng: Rng) -> tuple[int, int]:
@@ -198,10 +198,12 @@ class Square(NamedTuple):
         corners_m = outline((0.0, self.side_m), (0.0, self.west_m + self.side_m))
         return Site(corners_m, obstacles, **more)
 
-    def grid(self, rng: Rng, count: int, inside: Inside = _anywhere) -> list[Place_m]:
-        """`grid` over the square but for its margin."""
+    def spread_places(self, rng: Rng, count: int, inside: Inside = _anywhere) -> list[Place_m]:
+        """`spread_places` over the square but for its margin."""
         least, most = MARGIN_M, self.side_m - MARGIN_M
-        return grid(rng, (least, most), (self.west_m + least, self.west_m + most), count, inside)
+        return spread_places(
+            rng, (least, most), (self.west_m + least, self.west_m + most), count, inside
+        )
 
 
 def tag(rng: Rng) -> str:
@@ -240,7 +242,7 @@ def upright(corners_m: Sequence[Place_m], base_m: float, height_m: float) -> Ver
     )
 
 
-def grid(
+def spread_places(
     rng: Rng,
     north_m: tuple[float, float],
     east_m: tuple[float, float],

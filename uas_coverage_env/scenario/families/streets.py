@@ -53,7 +53,7 @@ def streets(rng: Rng, size: Size) -> Scenario:
                     low + (high - low) * height,
                 )
             )
-    places = square.grid(rng, n_waypoints)
+    places = square.spread_places(rng, n_waypoints)
     wanted = [Wanted(place, _STREET_ALTITUDE_M, "street", radius_m=12.0) for place in places]
     return square.site(blocks).scenario(rng, f"streets-{tag(rng)}", n_uas, wanted, size)
 

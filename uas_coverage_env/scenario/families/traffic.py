@@ -28,7 +28,7 @@ def traffic(rng: Rng, size: Size) -> Scenario:
         along_north = k % 2 == 0
         span, across = (span_north, span_east) if along_north else (span_east, span_north)
         moving.append(_shuttle(rng, f"helicopter_{k + 1}", along_north, span, across))
-    wanted = [Wanted(place, _ALTITUDE_M) for place in square.grid(rng, n_waypoints)]
+    wanted = [Wanted(place, _ALTITUDE_M) for place in square.spread_places(rng, n_waypoints)]
     return square.site(moving=moving).scenario(rng, f"traffic-{tag(rng)}", n_uas, wanted, size)
 
 

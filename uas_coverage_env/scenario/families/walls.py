@@ -31,7 +31,7 @@ def walls(rng: Rng, size: Size) -> Scenario:
     for k in range(n_walls):
         east_m = square.west_m + side_m * (k + 1 + rng.uniform(-0.1, 0.1)) / (n_walls + 1)
         pieces += _wall(rng, f"wall_{k + 1}", east_m, side_m)
-    wanted = [Wanted(place) for place in square.grid(rng, n_waypoints)]
+    wanted = [Wanted(place) for place in square.spread_places(rng, n_waypoints)]
     return square.site(pieces).scenario(rng, f"walls-{tag(rng)}", n_uas, wanted, size)
 
 

@@ -21,20 +21,19 @@ from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, prolonged
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_env.autopilot import guide
 from uas_coverage_env.autopilot.control import command_wrench
+from uas_coverage_env.autopilot.guidance import guide
+from uas_coverage_env.autopilot.return_path import flight_home
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.mission import MissionBrief, carefully, seconds_home, with_free_aims
+from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.approach import carefully, with_free_aims
 from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
-from uas_coverage_env.vehicle import (
-    compile_vehicle,
-    dod_per_s,
-    lpv_step,
-    reseed_reference,
-    velocity_climb_wrench,
-)
+from uas_coverage_env.vehicle import compile_vehicle, lpv_step
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import COMMAND_DTYPE, HOME, SwarmState, build_arena
+from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
+from uas_coverage_env.vehicle.range import dod_per_s
+from uas_coverage_env.world import SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]
 _PURSUED_S = (8.0, 4.0, 2.0, 1.0)  # how long the way home is followed before the brakes
@@ -148,7 +147,7 @@ class RouteFollower:
         """
         x, most = problem.x0[uas], float(problem.dod_max[uas])
         left_s = (most - float(x[S.DOD])) / dod_per_s(problem.vehicles[uas], most)
-        home_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
+        home_s = sum(flight_home(self._arena, self._row[problem.names[uas]], x))
         return left_s - home_s < _NEXT_STEPS * self._brief.dt_s
 
     def _left_at_home_s(self, problem: PlanningProblem, swarm: SwarmState, uas: int) -> float:
@@ -157,7 +156,7 @@ class RouteFollower:
         most = float(problem.dod_max[uas])
         per_s = dod_per_s(problem.vehicles[uas], most)
         clock_s = (rules.max_steps - swarm.step) * rules.dt_s
-        roughly_s = sum(seconds_home(self._arena, self._row[problem.names[uas]], x))
+        roughly_s = sum(flight_home(self._arena, self._row[problem.names[uas]], x))
         left_s = min((most - float(x[S.DOD])) / per_s, clock_s) - roughly_s
         if left_s > ROUTE_HOME_RESERVE.kept_s:
             return left_s

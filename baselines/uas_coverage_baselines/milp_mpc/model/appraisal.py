@@ -32,7 +32,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
     CornerCutting,
     Coverage,
     Dynamics,
-    Geofence,
+    InsideGeofence,
     MinHeight,
     MovingObstacles,
     Obstacles,
@@ -42,13 +42,14 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block, Priced, formul
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningProblem, Trajectories
 from uas_coverage_baselines.milp_mpc.model.reductions.bounds import rows_as_bounds
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
-from uas_coverage_baselines.milp_mpc.solvers import SolverError, SolverLimits
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
+from uas_coverage_baselines.milp_mpc.solvers.interface import SolverError
 
 FloatArray = NDArray[np.float64]
 _MEASURED = frozenset(
     (
-        *(Dynamics, Capabilities, Collision, Geofence, Obstacles, MovingObstacles),
+        *(Dynamics, Capabilities, Collision, InsideGeofence, Obstacles, MovingObstacles),
         *(CornerCutting, Coverage, MinHeight),
     )
 )

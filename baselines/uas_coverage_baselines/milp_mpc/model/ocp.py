@@ -20,18 +20,18 @@ from uas_coverage_baselines.milp_mpc.model.blocks import (
     CornerCutting,
     Coverage,
     Dynamics,
-    Geofence,
+    InsideGeofence,
     MinHeight,
     MovingObstacles,
     Obstacles,
     Slack,
     TargetDistance,
-    TimeToGo,
-    coverable,
 )
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
+from uas_coverage_baselines.milp_mpc.model.blocks.time_to_go import TimeToGo
 from uas_coverage_baselines.milp_mpc.model.milp import ELIMINATED, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
 
 
 @runtime_checkable
@@ -61,7 +61,7 @@ OCP: tuple[Block, ...] = (
     Dynamics(),
     Capabilities(),
     Slack(),
-    Geofence(),
+    InsideGeofence(),
     MinHeight(),
     TargetDistance(),
     Collision(),

@@ -17,7 +17,8 @@ from uas_coverage_baselines.milp_mpc.model.milp import Columns
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NormBounds, norm_bounds
 from uas_coverage_baselines.milp_mpc.model.reachability import Reach
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.vehicle import VX, VZ, LinearModel, VehicleParams
+from uas_coverage_env.vehicle import LinearModel, VehicleParams
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 FloatArray = NDArray[np.float64]
 NEVER = 10_000

@@ -23,7 +23,8 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     Weights,
 )
 from uas_coverage_env.geometry import ConvexPolytope
-from uas_coverage_env.vehicle import DOD, VehicleParams, linear_model
+from uas_coverage_env.vehicle import VehicleParams, linear_model
+from uas_coverage_env.vehicle.layout import DOD
 
 _ARRAYS = (
     "x0",

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.tightening import across, kept
-from uas_coverage_env.geometry import closed_cylinder_faces, cylinder_clearance, segment_clearance
+from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
+from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
 
 FloatArray = NDArray[np.float64]
 _TOLERANCE_M = 1e-4

@@ -30,7 +30,7 @@ from uas_coverage_baselines.milp_mpc.search.restricted import (
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_baselines.milp_mpc.search.team_search import Effort, TeamSearch
 from uas_coverage_baselines.milp_mpc.search.trajectories import (
-    Trajectory,
+    PlannedTrajectory,
     as_trajectory,
     left_over,
     teams,
@@ -74,14 +74,14 @@ def decide(
             uas: side_by_side.submit(construct, problem, uas, dt_s, blocks=blocks)
             for uas in planned
         }
-        round_robin.writing_s = search.formulate(planned) / len(planned)
+        round_robin.writing_s = search.prepare(planned) / len(planned)
         pools = [
             constructing[uas].result()
             if uas in planned
             else [as_trajectory(problem, uas, left[uas][0])]
             for uas in swarm
         ]
-        candidates: list[Sequence[Trajectory]] = list(teams(problem, pools, effort.teams))
+        candidates: list[Sequence[PlannedTrajectory]] = list(teams(problem, pools, effort.teams))
         if previous is not None:
             candidates.insert(0, left_over(problem, previous, dt_s, blocks))
         tasks = [task for task in _unique_tasks(candidates) if task[0] in planned]
@@ -114,15 +114,17 @@ _RESORTS = 2  # trajectories of a UAS without a plan that are refined again, mor
 def _last_resorts(
     problem: PlanningProblem,
     uas: int,
-    tasks: Sequence[tuple[int, Trajectory]],
+    tasks: Sequence[tuple[int, PlannedTrajectory]],
     spare: Sequence[Plan],
-) -> list[tuple[int, Trajectory]]:
+) -> list[tuple[int, PlannedTrajectory]]:
     """Where to look more widely for a UAS without a plan: its best trajectories, stopping."""
     own = [task for task in tasks if task[0] == uas][:_RESORTS]
     return own + [(uas, as_trajectory(problem, uas, plan)) for plan in spare[-1:]]
 
 
-def _unique_tasks(candidates: Sequence[Sequence[Trajectory]]) -> list[tuple[int, Trajectory]]:
+def _unique_tasks(
+    candidates: Sequence[Sequence[PlannedTrajectory]],
+) -> list[tuple[int, PlannedTrajectory]]:
     """(UAS, trajectory) pairs to refine, the most promising first, none twice."""
     tasks, seen = [], set()
     for team in candidates:

@@ -22,21 +22,14 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     TourSegment,
     Trajectories,
 )
-from uas_coverage_baselines.milp_mpc.search.trajectories import Trajectory
+from uas_coverage_baselines.milp_mpc.search.trajectories import PlannedTrajectory
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.geometry import signed_distance, sphere_faces
-from uas_coverage_env.vehicle import (
-    N_INPUTS,
-    VX,
-    VY,
-    VZ,
-    X,
-    Y,
-    Z,
-    compile_vehicle,
-    fly_kinematics,
-    velocity_climb_wrench,
-)
+from uas_coverage_env.geometry import sphere_faces
+from uas_coverage_env.geometry.segments import signed_distance
+from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.inner_loop import velocity_climb_wrench
+from uas_coverage_env.vehicle.layout import N_INPUTS, VX, VY, VZ, X, Y, Z
+from uas_coverage_env.vehicle.lpv import fly_kinematics
 
 FloatArray = NDArray[np.float64]
 _DEPTH = 4
@@ -53,7 +46,7 @@ def construct(
     dt_s: float,
     keep: int = 40,
     blocks: Sequence[Block] = OCP,
-) -> list[Trajectory]:
+) -> list[PlannedTrajectory]:
     """The most promising flights of one UAS, best first, no two covering the same waypoints.
 
     Args:
@@ -72,7 +65,7 @@ def construct(
     if problem.tours and (tour := problem.tours[uas]) is not None:
         turns_m = _turns_m(problem, uas)
         aim = tour.aims_m[-1] if turns_m is None else turns_m
-    best: dict[bytes, tuple[float, Trajectory]] = {}
+    best: dict[bytes, tuple[float, PlannedTrajectory]] = {}
     for lead_s in _LEADS_S:
         positions, visits, depth = _fly_all(
             vehicle,
@@ -92,7 +85,7 @@ def construct(
         for row in np.argsort(-values, kind="stable")[: 4 * keep]:
             key = (visits[row] < NEVER).tobytes()
             if key not in best or best[key][0] < values[row]:
-                flight = Trajectory(
+                flight = PlannedTrajectory(
                     positions[row], visits[row], float(costs[row]), float(depth[row])
                 )
                 best[key] = (float(values[row]), flight)
@@ -101,8 +94,8 @@ def construct(
 
 
 def _priced(
-    appraisal: Appraisal, uas: int, found: Sequence[Trajectory], problem: PlanningProblem
-) -> list[Trajectory]:
+    appraisal: Appraisal, uas: int, found: Sequence[PlannedTrajectory], problem: PlanningProblem
+) -> list[PlannedTrajectory]:
     """Flights with what blocks say of them that are priced by their rows, best first."""
     prices = appraisal.prices_of_paths(uas, [(one.positions_m, one.visit) for one in found])
     priced = [

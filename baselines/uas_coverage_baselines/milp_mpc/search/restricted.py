@@ -18,9 +18,12 @@ from uas_coverage_baselines.milp_mpc.model.blocks.separation import (
 from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Columns
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.model.reductions import Formulation, write_smallest
 from uas_coverage_baselines.milp_mpc.model.reductions.elimination import flown_states
-from uas_coverage_baselines.milp_mpc.solvers import Solution
+from uas_coverage_baselines.milp_mpc.model.reductions.formulations import (
+    Formulation,
+    write_smallest,
+)
+from uas_coverage_baselines.milp_mpc.solvers.interface import Solution
 
 FloatArray = NDArray[np.float64]
 _QUICKEST = "state"  # to write and to solve, where little is free

@@ -23,17 +23,16 @@ from uas_coverage_baselines.milp_mpc.search.restricted import (
 )
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_baselines.milp_mpc.search.trajectories import (
-    Trajectory,
+    PlannedTrajectory,
     as_trajectory,
     teams,
 )
-from uas_coverage_baselines.milp_mpc.solvers import (
+from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
+from uas_coverage_baselines.milp_mpc.solvers.interface import (
     Solution,
     SolverError,
-    SolverLimits,
     SolveStatus,
     Start,
-    solver_named,
 )
 
 FloatArray = NDArray[np.float64]
@@ -101,7 +100,7 @@ class TeamSearch:
         self._best: Plan | None = None
         self._bound = -np.inf
 
-    def formulate(self, planned: Sequence[int]) -> float:
+    def prepare(self, planned: Sequence[int]) -> float:
         """Write the own programs of the UAS that are planned for; how long it took [s]."""
         before = time.perf_counter()
         self._own = {uas: RestrictedMilp(self._alone[uas], self._blocks) for uas in planned}
@@ -143,7 +142,11 @@ class TeamSearch:
         return Reason.NO_TIME if self._late else Reason.NO_PLAN
 
     def refined(
-        self, uas: int, flight: Trajectory, neighbourhood: Neighbourhood, at_most_s: float = np.inf
+        self,
+        uas: int,
+        flight: PlannedTrajectory,
+        neighbourhood: Neighbourhood,
+        at_most_s: float = np.inf,
     ) -> Plan | None:
         """Solve a UAS's own OCP restricted to what lies near a flight."""
         if self.joint_is_due(uas):
@@ -182,7 +185,7 @@ class TeamSearch:
         return self.time_left_s() < _JOINT_SHARE * self.effort.time_limit_s
 
     def polished(
-        self, uas: int, tasks: Sequence[tuple[int, Trajectory]], at_most_s: float
+        self, uas: int, tasks: Sequence[tuple[int, PlannedTrajectory]], at_most_s: float
     ) -> list[Plan]:
         """Plans of one UAS along its tour: around its flights, then around the best again.
 

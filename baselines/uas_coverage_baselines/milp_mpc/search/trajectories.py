@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal, gains, visits
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningProblem, Trajectories
-from uas_coverage_env.vehicle import VX, VZ
+from uas_coverage_env.vehicle.layout import VX, VZ
 
 FloatArray = NDArray[np.float64]
 _PER_METRE = 1e-4  # of two that gain the same the shorter one; a waypoint's step is worth 1
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class PlannedTrajectory:
     """One UAS's simulated flight over the horizon.
 
     Attributes:
@@ -43,16 +43,16 @@ class Trajectory:
         return float(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum())
 
 
-def as_trajectory(problem: PlanningProblem, uas: int, plan: Plan) -> Trajectory:
+def as_trajectory(problem: PlanningProblem, uas: int, plan: Plan) -> PlannedTrajectory:
     """A UAS's own plan as a flight: what it covers when, and what it costs besides."""
     visit = visits(problem, plan)[0]
     gained = float(gains(problem, visit).sum())
-    return Trajectory(plan.x[0, :, 0:3], visit, plan.objective + gained, 0.0)
+    return PlannedTrajectory(plan.x[0, :, 0:3], visit, plan.objective + gained, 0.0)
 
 
 def left_over(
     problem: PlanningProblem, left: Plan, dt_s: float, blocks: Sequence[Block] = OCP
-) -> list[Trajectory]:
+) -> list[PlannedTrajectory]:
     """What is left of the previous plan as flights; beyond its end at falling velocity."""
     appraisal, result = Appraisal(problem, blocks), []
     for row, name in enumerate(problem.names):
@@ -68,13 +68,13 @@ def left_over(
         path = np.vstack([path, path[-1] + 0.5 * dt_s * velocity * beyond])
         cost = float(appraisal.costs(row, Trajectories(path[None], visit[None]))[0])
         (price,) = appraisal.prices_of_paths(row, [(path, visit)])
-        result.append(Trajectory(path, visit, cost + price.cost, price.excess))
+        result.append(PlannedTrajectory(path, visit, cost + price.cost, price.excess))
     return result
 
 
 def teams(
-    problem: PlanningProblem, pools: Sequence[Sequence[Trajectory]], keep: int
-) -> list[tuple[Trajectory, ...]]:
+    problem: PlanningProblem, pools: Sequence[Sequence[PlannedTrajectory]], keep: int
+) -> list[tuple[PlannedTrajectory, ...]]:
     """Good combinations of one flight per UAS, best first.
 
     A waypoint counts once, for the UAS that gets there first; flights that come too close to each
@@ -119,7 +119,7 @@ def teams(
 
 
 def _clashes(
-    problem: PlanningProblem, pools: Sequence[Sequence[Trajectory]]
+    problem: PlanningProblem, pools: Sequence[Sequence[PlannedTrajectory]]
 ) -> list[dict[int, FloatArray]]:
     """[j][k] (flights of j, flights of k) how deep they come too close, summed over samples.
 

@@ -2,15 +2,7 @@
 
 from importlib import import_module
 
-from uas_coverage_baselines.milp_mpc.solvers.interface import (
-    TOLERANCE,
-    Solution,
-    Solve,
-    SolverError,
-    SolverLimits,
-    SolveStatus,
-    Start,
-)
+from uas_coverage_baselines.milp_mpc.solvers.interface import Solve, SolverLimits
 from uas_coverage_env.files.strict_toml import InputError
 
 _PACKAGES = {"highs": "highspy", "scip": "pyscipopt", "gurobi": "gurobipy"}
@@ -39,14 +31,4 @@ def solver_named(name: str) -> Solve:
         ) from error
 
 
-__all__ = [
-    "SOLVERS",
-    "TOLERANCE",
-    "Solution",
-    "Solve",
-    "SolveStatus",
-    "SolverError",
-    "SolverLimits",
-    "Start",
-    "solver_named",
-]
+__all__ = ["SolverLimits", "solver_named"]

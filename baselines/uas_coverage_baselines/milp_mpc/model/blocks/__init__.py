@@ -4,15 +4,14 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import Battery
 from uas_coverage_baselines.milp_mpc.model.blocks.capabilities import Capabilities
 from uas_coverage_baselines.milp_mpc.model.blocks.collision import Collision
 from uas_coverage_baselines.milp_mpc.model.blocks.corner_cutting import CornerCutting
-from uas_coverage_baselines.milp_mpc.model.blocks.coverage import Coverage, coverable
+from uas_coverage_baselines.milp_mpc.model.blocks.coverage import Coverage
 from uas_coverage_baselines.milp_mpc.model.blocks.dynamics import Dynamics
-from uas_coverage_baselines.milp_mpc.model.blocks.geofence import Geofence
+from uas_coverage_baselines.milp_mpc.model.blocks.geofence import InsideGeofence
 from uas_coverage_baselines.milp_mpc.model.blocks.min_height import MinHeight
 from uas_coverage_baselines.milp_mpc.model.blocks.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.milp_mpc.model.blocks.obstacles import Obstacles
 from uas_coverage_baselines.milp_mpc.model.blocks.slack import Slack
 from uas_coverage_baselines.milp_mpc.model.blocks.target_distance import TargetDistance
-from uas_coverage_baselines.milp_mpc.model.blocks.time_to_go import TimeToGo
 
 __all__ = [
     "BatteryReserve",
@@ -21,12 +20,10 @@ __all__ = [
     "CornerCutting",
     "Coverage",
     "Dynamics",
-    "Geofence",
+    "InsideGeofence",
     "MinHeight",
     "MovingObstacles",
     "Obstacles",
     "Slack",
     "TargetDistance",
-    "TimeToGo",
-    "coverable",
 ]

@@ -14,13 +14,10 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 )
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.planning.reserves import BRAKING_S, MILP_RESERVE
-from uas_coverage_env.vehicle import (
-    LinearModel,
-    VehicleParams,
-    dod_per_s,
-)
+from uas_coverage_env.vehicle import LinearModel, VehicleParams
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import (
+    dod_per_s,
     flight_seconds,
     level_seconds,
     speeds_of,
@@ -113,7 +110,7 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
     return result if allowance else result - BRAKING_S
 
 
-def seconds_home(vehicle: VehicleParams, away_m: FloatArray) -> float:
+def straight_seconds_home(vehicle: VehicleParams, away_m: FloatArray) -> float:
     """Flight time home as the reserve takes it [s]; how far on the safe side: docs/range.md.
 
     Args:

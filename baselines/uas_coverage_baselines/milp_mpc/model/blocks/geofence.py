@@ -9,7 +9,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Varia
 from uas_coverage_baselines.milp_mpc.model.tightening import across, kept
 
 
-class Geofence:
+class InsideGeofence:
     """D_G(p(n)) <= delta_G: inside the fence by its margin (Sec. III-C.3, eq. (OCP_5), via
     eq. (const_CS_in) with delta_G = -margin).
     """  # noqa: D205

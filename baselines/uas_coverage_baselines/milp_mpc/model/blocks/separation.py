@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
 from uas_coverage_baselines.milp_mpc.model.tightening import across, kept
-from uas_coverage_env.geometry import closed_cylinder_faces
+from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
 
 FloatArray = NDArray[np.float64]
 _ON_FACE_M = 1e-6

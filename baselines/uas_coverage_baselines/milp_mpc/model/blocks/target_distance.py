@@ -7,7 +7,7 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.model.blocks.coverage import uncovered_as
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
-from uas_coverage_env.geometry import closed_cylinder_faces
+from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
 
 
 class TargetDistance:

@@ -3,11 +3,6 @@
 One reduction per file, with the proof that it is exact; `formulations` names what they add up to.
 """
 
-from uas_coverage_baselines.milp_mpc.model.reductions.formulations import (
-    FORMULATIONS,
-    Formulation,
-    write_smallest,
-)
-from uas_coverage_baselines.milp_mpc.model.reductions.lazy import LazySolution, solve_lazily
+from uas_coverage_baselines.milp_mpc.model.reductions.formulations import FORMULATIONS
 
-__all__ = ["FORMULATIONS", "Formulation", "LazySolution", "solve_lazily", "write_smallest"]
+__all__ = ["FORMULATIONS"]

@@ -17,7 +17,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks.separation import from_obstacl
 from uas_coverage_baselines.milp_mpc.model.milp import BuiltMilp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
 from uas_coverage_baselines.milp_mpc.model.reductions.formulations import Formulation
-from uas_coverage_baselines.milp_mpc.solvers import Solution
+from uas_coverage_baselines.milp_mpc.solvers.interface import Solution
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""What PettingZoo and Gymnasium call."""

@@ -1,0 +1,1 @@
+"""Many missions side by side, flown by one compiled call."""

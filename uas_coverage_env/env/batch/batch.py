@@ -1,0 +1,468 @@
+"""Many missions side by side in arrays: one compiled call flies all of them for one step."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Unpack
+
+import numba
+import numpy as np
+from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
+
+from uas_coverage_env.autopilot.assist import assistants
+from uas_coverage_env.compiled.kernels import machine_code
+from uas_coverage_env.compiled.random import SEEDS
+from uas_coverage_env.entities.state import FLYING, STATE
+from uas_coverage_env.env.actions.given import accept_of_lanes
+from uas_coverage_env.env.batch.checkpoint import checked
+from uas_coverage_env.env.batch.drawn import pool_of
+from uas_coverage_env.env.batch.kernel import (
+    BatchRules,
+    lane_code,
+    step_batch,
+    step_batch_in_threads,
+)
+from uas_coverage_env.env.batch.memory import (
+    DISABLED,
+    DRAW,
+    FLY,
+    NEXT_STEP,
+    REST,
+    SAME_STEP,
+    WAITS,
+    SubEnvironments,
+    new_missions,
+)
+from uas_coverage_env.env.batch.scenes import change_scenes, install_scenes
+from uas_coverage_env.env.batch.state_dict import (
+    by_present_names,
+    check_like,
+    fields_of,
+    records_of,
+)
+from uas_coverage_env.env.episode.act import acting_of, is_own, refuse_what_it_wrote
+from uas_coverage_env.env.episode.express import Moment, joint_action_of
+from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Learners
+from uas_coverage_env.env.episode.observe import observing_of
+from uas_coverage_env.env.episode.pay import paying_of
+from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, takes_settings
+from uas_coverage_env.env.episode.step import ACCEPTED, Rules
+from uas_coverage_env.env.versions import V0, Version
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.scenario.source import ScenarioLike
+from uas_coverage_env.simulation.flight import feature_code
+from uas_coverage_env.simulation.world import swarm_state
+from uas_coverage_env.world import Command, SwarmState, WorldState
+from uas_coverage_env.world.arena import ARENA
+
+AUTORESET = {
+    "next_step": NEXT_STEP,
+    "same_step": SAME_STEP,
+    "disabled": DISABLED,
+    "rest": WAITS,
+}
+"""When a mission that has ended begins anew; with `rest` not at all, so that each lane flies one
+mission and `(lanes.terminated | lanes.truncated).all()` says when all have ended."""
+
+_MOST_LANES = 2**20
+
+
+class CoverageBatch:
+    """Missions in L lanes; what flies in one is, bit for bit, what `CoverageParallelEnv` flies.
+
+    Every lane draws the scenario of each of its missions by its own seed and the number of the
+    mission alone: neither the number of lanes nor that of threads changes a result. From a sequence
+    of scenarios kernels draw; a family or another generator is asked in Python when a mission
+    begins, for that lane alone.
+
+    Where scenarios differ in their number of UAS, the arrays have room for the largest: rows of UAS
+    that a scenario does not have are zero, never fly, and what is asked of them has no effect.
+
+    Args:
+        num_envs: L.
+        scenario: A scenario, its name or its file; a sequence of these, see `ScenarioPool`; or what
+            draws them, see `DrawnPool`.
+        autoreset: A name of `AUTORESET`.
+        threads: How many of numba's threads share the lanes, `NUMBA_NUM_THREADS` at most. They wait
+            for work by spinning: on a busy machine set `OMP_WAIT_POLICY=passive`.
+        version: Of the environments.
+        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
+        return_mode: The world flies a UAS home in time, whatever its actions.
+        safety_filter: The world replaces commands after which a UAS could not brake in time.
+        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
+        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
+        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
+            observation (`default`, `local`, `grid`); None: those of the version.
+        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
+        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
+            (): none.
+        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
+            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
+            read infos.
+        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
+            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
+            that `Box`.
+        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
+            libraries that make an array of every info (TorchRL). None: as in the version.
+
+    Attributes:
+        settings: How missions are flown and paid.
+        num_envs: L.
+        n_uas: U, of the largest scenario.
+        pool: The scenarios.
+        missions: What happened, see `Missions`; the arrays are written by every step.
+        autoreset: As in `batch_memory`.
+
+    Raises:
+        ValueError: An argument is none of what is allowed; says what is.
+    """
+
+    @takes_settings
+    def __init__(
+        self,
+        num_envs: int,
+        scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
+        *,
+        autoreset: str = "next_step",
+        threads: int = 1,
+        version: Version = V0,
+        **settings: Unpack[MissionKeywords],
+    ) -> None:
+        _check_count("num_envs", num_envs, _MOST_LANES)
+        if threads != 1:
+            _check_count("threads", threads, numba.get_num_threads())
+        if autoreset not in AUTORESET:
+            raise ValueError(f"autoreset is {autoreset!r}; it is one of {', '.join(AUTORESET)}")
+        self.settings = MissionSettings.of(settings, version)
+        self.num_envs = int(num_envs)
+        self.pool = pool_of(scenario, self.settings, self.num_envs)
+        self.n_uas = self.pool.sizes["U"]
+        self.actions = self.pool.actions
+        self.chooses = self.settings.chooses
+        self.filters = self.settings.safety_filter
+        self.autoreset = AUTORESET[autoreset]
+        self.missions = new_missions(self.pool.sizes, self.num_envs, int(threads))
+        shape = (self.num_envs, self.n_uas, self.settings.observation_size)
+        self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
+        self._threads = int(threads)
+        self._observing = observing_of(self.settings.observation, version.observation)
+        # else kernels do, which neither draw nor change scenes
+        self._begins_here = self.pool.draws or (self.pool.changes and self.autoreset == SAME_STEP)
+        self._begun = False
+        self._kernel: Callable[..., int] | None = None
+        self._rules: BatchRules | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # neither machine code nor its addresses travel
+        return {**self.__dict__, "_kernel": None, "_rules": None}
+
+    @property
+    def worlds(self) -> WorldState:
+        """The states of the world, with an axis of lanes in front."""
+        return self.missions.worlds
+
+    @property
+    def learners(self) -> Learners:
+        """What learners add to them, likewise."""
+        return self.missions.learners
+
+    @property
+    def lanes(self) -> SubEnvironments:
+        """What the lanes are doing."""
+        return self.missions.lanes
+
+    @property
+    def observation(self) -> NDArray[np.float32]:
+        """(L, U, V) the latest; overwritten by the step after the next."""
+        return self._observations[0]
+
+    @property
+    def flying(self) -> NDArray[np.bool_]:
+        """(L, U) which UAS fly now, an array of its own."""
+        return self.worlds.uas["status"] == FLYING
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """(L, U, choices) the choices that exist now."""
+        return self.actions.kind.masks(self.learners.candidates)
+
+    def seed(self, seed: int | Sequence[int | None]) -> None:
+        """Seed the lanes, each of which counts its missions from 0 again.
+
+        Args:
+            seed: A number s gives lane i the seed s + i; or one seed for each lane, None where it
+                goes on as it is.
+
+        Raises:
+            ValueError: A seed is negative or too large, or their number is wrong.
+        """
+        if isinstance(seed, int | np.integer):
+            seeds: list[int | None] = [int(seed) + lane for lane in range(self.num_envs)]
+        elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
+            seeds = list(seed)
+        else:
+            raise ValueError(f"seed is {seed!r}; give a whole number, or one for each environment")
+        if len(seeds) != self.num_envs:
+            raise ValueError(
+                f"{len(seeds)} seeds for {self.num_envs} environments; give one for each"
+            )
+        for lane, value in enumerate(seeds):
+            if value is None:
+                continue
+            whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+            if not whole or not 0 <= value < SEEDS:
+                raise ValueError(
+                    f"seed of environment {lane} is {value!r}; give a whole number from 0 to "
+                    f"2**64 - 1"
+                )
+            self.lanes.seed[lane] = value
+            self.lanes.mission[lane] = -1
+
+    def reset(
+        self,
+        seed: int | Sequence[int | None] | None = None,
+        *,
+        mask: NDArray[np.bool_] | None = None,
+        scenarios: Any = None,
+    ) -> NDArray[np.float32]:
+        """Begin missions.
+
+        Args:
+            seed: See `seed`; None: the lanes go on drawing, at first from seeds of no meaning.
+            mask: (L,) in which lanes; None: in all.
+            scenarios: What to fly instead of drawing; None: draw. Of a sequence of scenarios (L,)
+                indices; where a family or another generator draws, one scenario (its name, its
+                file) for all of these lanes, or a sequence of L of them, None in lanes that draw.
+
+        Returns:
+            (L, U, V) see `observation`.
+
+        Raises:
+            ValueError: An argument is wrong.
+        """
+        if mask is None:
+            mask = np.ones(self.num_envs, dtype=np.bool_)
+        elif mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise ValueError(
+                f"mask has shape {mask.shape} and dtype {mask.dtype}; "
+                f"give one truth value for each of {self.num_envs} environments"
+            )
+        if not self._begun and not mask.all():
+            raise ResetNeeded("reset of some environments before any: reset all environments first")
+        chosen = self.pool.chosen(scenarios, self.num_envs)
+        if seed is not None:
+            self.seed(seed)
+        self._run(self.pool.orders(mask, self.lanes, chosen))
+        self._begun = True
+        return self.observation
+
+    def step(self, actions: Any) -> NDArray[np.float32]:
+        """Fly all lanes for one step; what came of it is in `lanes`.
+
+        Args:
+            actions: (L, U, size) numbers, or (L, U) choices; as (L, -1) too.
+
+        Returns:
+            (L, U, V) see `observation`.
+
+        Raises:
+            ValueError: An action is invalid; names lane, UAS and value. Nothing has changed.
+            ResetNeeded: `reset` was not called before, or a lane that has ended was not reset.
+        """
+        lanes = self.lanes
+        if not self._begun:
+            raise ResetNeeded("step() before reset(): call reset() first")
+        if self.autoreset == DISABLED:
+            ended = lanes.terminated | lanes.truncated
+            if ended.any():
+                raise ResetNeeded(
+                    f"the mission of environment {int(ended.argmax())} has ended: reset those that "
+                    f"have ended before the next step, or choose another autoreset mode"
+                )
+        accept_of_lanes(self.actions, actions, self.learners.asked)
+        orders = lanes.orders.copy()
+        if self.pool.draws:
+            # what is drawn begins after the step of the others, which may still be refused
+            refused = self._run(np.where(orders == DRAW, REST, orders))
+        else:
+            refused = self._run(lanes.orders)
+        if refused != ACCEPTED:
+            lane, i = divmod(refused, self.n_uas)
+            raise ValueError(
+                f"action of UAS {i} in environment {lane} is "
+                f"{self.learners.asked[lane, i].tolist()}; give finite numbers"
+            )
+        if self.pool.changes:
+            flew = orders == FLY
+            change_scenes(self.pool, self.missions, flew, self._observing, self.observation)
+        if self._begins_here:
+            self._draw_next(orders == DRAW)
+        if self._rules is not None and is_own(self._rules.rules.acting):
+            names = [f"UAS {i}" for i in range(self.n_uas)]
+            refuse_what_it_wrote(self.actions.kind, self.learners.asked, names)
+        return self.observation
+
+    def state_dict(self) -> dict[str, NDArray[Any]]:
+        """All that changes from step to step, in arrays of their own, by name.
+
+        Of missions that are drawn it has the states of the generators that drew them.
+
+        Raises:
+            ValueError: A mission was given to `reset`, not drawn.
+        """
+        return fields_of(self._changing())
+
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on where a batch of the same arguments was when its `state_dict` was taken.
+
+        Raises:
+            ValueError: An array is missing, surplus, of another shape or dtype, or holds what no
+                mission of this batch can have.
+        """
+        own, state = self._changing(), by_present_names(state)
+        check_like(state, fields_of(own))
+        state = records_of(state, own)
+        drawn, changed = checked(self.pool, state)
+        self.pool.install(drawn)
+        for name, array in own.items():
+            array[...] = state[name]
+        install_scenes(self.pool, self.lanes.scenario, self.lanes.scene, changed)
+        # the other array of observations is not what it was
+        self.missions.settled[:] = False
+        self._begun = bool((self.lanes.mission >= 0).all())
+
+    def _changing(self) -> dict[str, NDArray[Any]]:
+        parts = (self.worlds, self.learners, self.lanes)
+        arrays = {k: v for part in parts for k, v in part._asdict().items()}
+        del arrays["scene"]  # it follows from the others
+        if not self.pool.changes:
+            del arrays["changes"]
+        arrays["observation"] = self.observation
+        return {**arrays, **self.pool.kept()}
+
+    def swarm_state(self, lane: int) -> SwarmState:
+        """What a planner of this lane sees now, in arrays of their own."""
+        arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scene[lane]))
+        return swarm_state(self.scenario_of(lane), arena, self.state_of(lane))
+
+    def actions_of(
+        self, commands: Sequence[Mapping[str, Command]], *, clip: bool = False
+    ) -> NDArray[Any]:
+        """The actions that fly planners' commands in the coming step, for imitation.
+
+        Args:
+            commands: Of each lane one for each UAS that flies; empty where a mission has ended.
+            clip: Whether a number beyond the range of the action becomes the end of it.
+
+        Returns:
+            (L, U, size) float32 or (L, U) choices, see `CoverageParallelEnv.action_of`; zero where
+            a UAS does not fly.
+
+        Raises:
+            ValueError: No action of this kind flies a command, or one that flies has none.
+        """
+        if len(commands) != self.num_envs:
+            raise ValueError(f"commands for {len(commands)} of {self.num_envs} environments")
+        rows = []
+        for lane, given in enumerate(commands):
+            moment = self._moment(lane)
+            rows.append(joint_action_of(self.actions, moment, given, clip, n_uas=self.n_uas))
+        return np.stack(rows)
+
+    def _moment(self, lane: int) -> Moment:
+        """The mission of a lane now; its arrays are views."""
+        s = int(self.lanes.scene[lane])
+        arena = ARENA.mission(self.pool.arrays.arenas, s)
+        sizes = ARENA.sizes_of(arena)
+        return Moment(
+            tuple(uas.name for uas in self.pool.scene_of(s).uas),
+            arena,
+            STATE.lane(self.worlds, lane, sizes).as_observed(),
+            TABLES.mission(self.pool.arrays.tables, s),
+            LEARNERS.lane(self.learners, lane, sizes),
+            self.settings.dynamics == "nonlinear",
+        )
+
+    def state_of(self, lane: int) -> WorldState:
+        """The state of the world of a lane; its arrays are views."""
+        arena = ARENA.mission(self.pool.arrays.arenas, int(self.lanes.scene[lane]))
+        return STATE.lane(self.worlds, lane, ARENA.sizes_of(arena))
+
+    def brief_of(self, lane: int) -> MissionBrief:
+        """What a planner may know of the mission of a lane."""
+        return MissionBrief.of(self.scenario_of(lane))
+
+    def scenario_of(self, lane: int) -> Scenario:
+        """The scenario that a lane flies; where events have changed the scene, as it is now."""
+        return self.pool.scene_of(int(self.lanes.scene[lane]))
+
+    def _draw_next(self, begins: NDArray[np.bool_]) -> None:
+        """Begin drawn missions, as the kernel begins those of a `ScenarioPool`."""
+        lanes, final = self.lanes, self.missions.final
+        if self.autoreset == SAME_STEP:
+            begins = lanes.terminated | lanes.truncated
+        if not begins.any():
+            return
+        orders = self.pool.orders(begins, lanes, None)
+        if self.autoreset != SAME_STEP:
+            self._run(orders, in_place=True)
+            return
+        for kept, array in (
+            (final.observation, self.observation),
+            (final.report, self.learners.report),
+            (final.candidates, self.learners.candidates),
+            (final.swarm, lanes.swarm),
+        ):
+            kept[begins] = array[begins]
+        ends = [array.copy() for array in (lanes.terminated, lanes.truncated, lanes.rewards)]
+        self._run(orders, in_place=True)
+        # this step is the last of a mission and shows the first sample of the next
+        lanes.terminated[:], lanes.truncated[:], lanes.rewards[:] = ends
+
+    def _run(self, orders: NDArray[np.int64], *, in_place: bool = False) -> int:
+        rules = self._rules = self._rules or self._compiled_rules()
+        before, free = self._observations
+        if in_place:
+            free = before
+        given = (self.pool.arrays, self.missions, orders, rules, before, free)
+        if self._kernel is None:
+            kernel = step_batch if self._threads == 1 else step_batch_in_threads
+            self._kernel = machine_code(kernel, given)
+        if self._threads == 1:
+            refused = self._kernel(*given)
+        else:
+            threads = numba.get_num_threads()
+            numba.set_num_threads(self._threads)
+            try:
+                refused = self._kernel(*given)
+            except SystemError as error:
+                # what a kernel raises in a parallel loop comes wrapped
+                raise error.__cause__ or error from None
+            finally:
+                numba.set_num_threads(threads)
+        if refused == ACCEPTED and not in_place:
+            self._observations = free, before
+        return refused
+
+    def _compiled_rules(self) -> BatchRules:
+        settings, kind = self.settings, self.actions.kind
+        goes_to = kind.goes_to or self.pool.goes_home
+        called = assistants(settings.return_mode, settings.safety_filter, goes_to=goes_to)
+        version = settings.version
+        paying = paying_of(settings.reward, settings.weights, version.reward)
+        nonlinear = settings.dynamics == "nonlinear"
+        code = feature_code(
+            self.pool.features, otherwise=nonlinear or self.pool.sizes["true vehicles"] > 0
+        )
+        acting = acting_of(kind, version.actions)
+        rules = Rules(acting, nonlinear, called, code, paying, self._observing)
+        # `_draw_next` comes between the end of a mission and the next
+        begins_later = self._begins_here and self.autoreset == SAME_STEP
+        autoreset = DISABLED if begins_later else self.autoreset
+        return BatchRules(rules, autoreset, lane_code(version, settings.observation_size))
+
+
+def _check_count(name: str, count: Any, most: int) -> None:
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 1 <= count <= most:
+        raise ValueError(f"{name} is {count!r}; give a whole number from 1 to {most}")

@@ -1,0 +1,1 @@
+"""One mission as a learner flies it: its arrays, its compiled step, its settings."""

@@ -1,0 +1,166 @@
+"""The observations of all UAS: the blocks of a version as one kernel, others at their address."""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+from numba import types
+
+from uas_coverage_env.compiled.calls import Signature
+from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
+from uas_coverage_env.compiled.views import slice_view
+from uas_coverage_env.entities.state import STATE
+from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Observing
+from uas_coverage_env.env.episode.parts import handed_over
+from uas_coverage_env.env.observation import ObservationBlock
+from uas_coverage_env.env.observation.nearest import nearest_waypoints
+from uas_coverage_env.world.arena import ARENA
+
+Blocks = tuple[ObservationBlock, ...]
+
+
+@cache
+def _types() -> tuple[types.Type, ...]:
+    """Of the arguments of a block's kernel."""
+    return (
+        ARENA.numba_type(), STATE.numba_type(), TABLES.numba_type(), LEARNERS.numba_type(),
+        types.int64, types.Array(types.float64, 1, "C"), types.Array(types.float32, 1, "C"),
+    )  # fmt: skip
+
+
+_SIGNATURE = Signature("arena state tables learners i parameters row", _types)
+_write_block = _SIGNATURE.call
+
+
+def observing_of(blocks: Sequence[ObservationBlock], own: Blocks) -> Observing:
+    """Compile the blocks, or load them from the cache.
+
+    Args:
+        blocks: Of an observation.
+        own: Of the version.
+
+    Raises:
+        ValueError: A block cannot be compiled.
+    """
+    return Observing(*handed_over(blocks, own, _address_of))
+
+
+def _address_of(block: ObservationBlock) -> int:
+    write = _with_notes(block.write, block.needs) if block.needs else block.write
+    return _SIGNATURE.address_of(write)
+
+
+@cache
+def _with_notes(write: Any, needs: tuple[Any, ...]) -> Any:
+    """The kernel of a block after those that it needs."""
+    note = noted(needs)
+
+    @kernel
+    def write_with_notes(arena, state, tables, learners, i, parameters, row):
+        note(arena, state, tables, learners, i)
+        write(arena, state, tables, learners, i, parameters, row)
+
+    return write_with_notes
+
+
+def noted(needs: Sequence[Any]) -> Any:
+    """One kernel that calls others in turn."""
+    if not needs:
+
+        @inlined_kernel
+        def note_nothing(arena, state, tables, learners, i):
+            pass
+
+        return note_nothing
+    note, rest = needs[0], noted(needs[1:])
+
+    @inlined_kernel
+    def note_both(arena, state, tables, learners, i):
+        note(arena, state, tables, learners, i)
+        rest(arena, state, tables, learners, i)
+
+    return note_both
+
+
+def _written(blocks: Blocks, column: int, first: int) -> Any:
+    """One kernel that writes blocks in turn, from a column and a parameter on."""
+    if not blocks:
+
+        @inlined_kernel
+        def write_nothing(arena, state, tables, learners, parameters, i, row):
+            pass
+
+        return write_nothing
+    write, size, n = blocks[0].write, blocks[0].size, len(blocks[0].parameters)
+    rest = _written(blocks[1:], column + size, first + n)
+
+    @inlined_kernel
+    def write_both(arena, state, tables, learners, parameters, i, row):
+        write(
+            arena, state, tables, learners, i,
+            slice_view(parameters, first, n), slice_view(row, column, size),
+        )  # fmt: skip
+        rest(arena, state, tables, learners, parameters, i, row)
+
+    return write_both
+
+
+@cache
+def observe_one_with(own: Blocks, *, calls: bool = True) -> Any:
+    """A kernel that observes, of which some blocks are part.
+
+    Args:
+        own: These; each note that they need is taken once.
+        calls: Whether it can call others at their address, which a GPU cannot.
+
+    Returns:
+        `observe_one(arena, state, tables, learners, observing, i, row)`: writes the observation of
+        UAS i into its row (V,) of float32, and the waypoints that it chooses among.
+    """
+    note = noted(tuple(dict.fromkeys(note for block in own for note in block.needs)))
+    write = _written(own, 0, 0)
+
+    @inlined_kernel
+    def observe_own(arena, state, tables, learners, observing, i, row):
+        nearest_waypoints(arena, state, i, learners.candidates[i])
+        note(arena, state, tables, learners, i)
+        write(arena, state, tables, learners, observing.parameters, i, row)
+
+    if not calls:
+        return observe_own
+
+    @inlined_kernel
+    def observe_one(arena, state, tables, learners, observing, i, row):
+        nearest_waypoints(arena, state, i, learners.candidates[i])
+        if observing.begins_as_version[0]:
+            note(arena, state, tables, learners, i)
+            write(arena, state, tables, learners, observing.parameters, i, row)
+        if rarely(observing.calls.shape[0] > 0):
+            for b in range(observing.calls.shape[0]):
+                call = observing.calls[b]
+                _write_block(
+                    call.address, arena, state, tables, learners, i,
+                    slice_view(observing.parameters, call.first, call.parameters),
+                    slice_view(row, call.column, call.size),
+                )  # fmt: skip
+
+    return observe_one
+
+
+@cache
+def observe_with(own: Blocks) -> Any:
+    """A kernel that observes for many, of which some blocks are part.
+
+    Returns:
+        `observe(arena, state, tables, learners, observing, observes, observation)`: writes the
+        rows of `observation` (U, V) of those UAS for which `observes` (U,) is set.
+    """
+    observe_one = observe_one_with(own)
+
+    @kernel
+    def observe(arena, state, tables, learners, observing, observes, observation):
+        for i in range(state.uas.shape[0]):
+            if observes[i]:
+                observe_one(arena, state, tables, learners, observing, i, observation[i])
+
+    return observe

@@ -1,0 +1,1 @@
+"""What policies see and do outside of the environments."""

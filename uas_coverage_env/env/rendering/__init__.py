@@ -1,0 +1,1 @@
+"""Pictures and windows of what an environment flies."""
