@@ -157,7 +157,7 @@ def test_five_kills_at_random_moments_change_nothing(nursery, two_yards, tmp_pat
     [
         ("compare --scenarios {yards} --planners hover,random-walk --seeds 0:8 --no-bounds", 32),
         ("score --level hard --planners hover,nearest-waypoint --missions 6", 12),
-        ("demonstrate generated:900000:900008 --planner nearest-waypoint", 8),
+        ("planner demonstrate generated:900000:900008 --planner nearest-waypoint", 8),
     ],
 )
 def test_a_worker_that_is_killed_costs_no_flight_of_any_command(
