@@ -30,6 +30,11 @@ def test_the_help_that_an_answer_names_is_there(old, capsys):
     assert "Usage" in capsys.readouterr().out
 
 
+def test_an_option_that_was_typed_once_is_known_wherever_it_stands(capsys):
+    assert main(["score", "--level", "easy", "--players", "hover"]) == 2
+    assert "is `uas-coverage score --planners` now" in capsys.readouterr().err
+
+
 def test_a_word_that_never_was_a_command_has_no_follower(capsys):
     assert main(["fronts"]) == 2
     assert "now; see" not in capsys.readouterr().err

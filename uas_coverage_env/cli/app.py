@@ -155,9 +155,10 @@ def _never_stop_at_a_letter() -> None:
 
 
 def _of_the_command_line(error: typer.TyperException, words: Sequence[str]) -> str:
-    follows = follower(*words[:1], getattr(error, "option_name", None) or "")
-    if follows:
-        return follows
+    # what was typed once is not known now, whatever follows it
+    said = follower(*words[:2]) or follower(*words[:1], getattr(error, "option_name", None) or "")
+    if said:
+        return said
     close = getattr(error, "possibilities", None)  # of an option that there is not, closest first
     if close:
         return f"No such option: {getattr(error, 'option_name', '')}. Did you mean {close[0]!r}?"

@@ -13,9 +13,6 @@ from typing import Any, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from uas_coverage_env.cli.retired import follower
-from uas_coverage_env.files.errors import InputError
-
 MARKUP = "markdown"
 HELP = {"help_option_names": ["-h", "--help"]}
 
@@ -99,14 +96,6 @@ class LazyGroup(TyperGroup):
         command = _command_of(cmd_name, command.entry)
         without_type_of_flags(command.get_params(ctx))
         return command
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that is called; what was one once is answered with what follows it."""
-        if ctx.parent is None and args[0] not in self.commands:
-            said = follower(*args[:2])
-            if said:
-                raise InputError(said)
-        return super().resolve_command(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The options of the group."""
