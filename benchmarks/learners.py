@@ -34,7 +34,7 @@ from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
 
 from uas_coverage_env import Scenario
 from uas_coverage_env.leaderboard import PlannerSpec
-from uas_coverage_env.runner.jobs import Workers
+from uas_coverage_env.runner.workers import Workers
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "agents" / "README.md"

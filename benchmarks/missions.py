@@ -38,7 +38,8 @@ from uas_coverage_env.flight.flight import unless_stopped
 from uas_coverage_env.flight.registry import options_of
 from uas_coverage_env.independent_check import BadFlightError, check
 from uas_coverage_env.leaderboard import seed_range
-from uas_coverage_env.runner.jobs import Job, Workers
+from uas_coverage_env.runner.jobs import Job
+from uas_coverage_env.runner.workers import Workers
 from uas_coverage_env.scenario import sample_scenario
 
 PLANNERS = "milp-mpc,milp-mpc-guided,lawnmower,nearest-waypoint"

@@ -32,7 +32,8 @@ from robustness_rows.store import Store
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard.hashing import source_hash
-from uas_coverage_env.runner.jobs import Job, Workers
+from uas_coverage_env.runner.jobs import Job
+from uas_coverage_env.runner.workers import Workers
 
 ROOT = Path(__file__).parents[1]
 STOPPED = 130

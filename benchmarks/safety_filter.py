@@ -36,7 +36,8 @@ from uas_coverage_baselines.random_walk import RandomWalk, RandomWalkOptions
 from uas_coverage_env import MissionBrief, Scenario
 from uas_coverage_env.entities.outcome import CONTACT_NAMES
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.runner.jobs import Job, Workers
+from uas_coverage_env.runner.jobs import Job
+from uas_coverage_env.runner.workers import Workers
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import Command, SwarmState

@@ -4,9 +4,9 @@ Version history: v0, first version.
 """
 
 from uas_coverage_env.env.api.aec import env, raw_env
+from uas_coverage_env.env.api.many import vector_env
 from uas_coverage_env.env.api.parallel import CoverageParallelEnv
 from uas_coverage_env.env.api.single import CoverageSwarmEnv
-from uas_coverage_env.env.api.vector import vector_env
 from uas_coverage_env.env.versions import V0
 
 VERSION = V0

@@ -28,8 +28,8 @@ from uas_coverage_env.cli import main
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import evaluate
 from uas_coverage_env.leaderboard import Row
-from uas_coverage_env.runner.jobs import WorkerLostError, Workers
 from uas_coverage_env.runner.store import opened, rows_in
+from uas_coverage_env.runner.workers import WorkerLostError, Workers
 
 TINY = str(Path(__file__).with_name("tiny.toml"))
 ASSISTED = {"return_mode": True, "safety_filter": True}

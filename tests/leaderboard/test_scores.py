@@ -27,8 +27,8 @@ from uas_coverage_env.leaderboard.table import (
     notes,
     scenarios_cells,
 )
-from uas_coverage_env.runner.jobs import Workers
 from uas_coverage_env.runner.store import opened
+from uas_coverage_env.runner.workers import Workers
 
 
 def by_label(rows, reference="base"):

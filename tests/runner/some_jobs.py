@@ -64,7 +64,8 @@ def noted(folder: str, number: int) -> int:
 
 def many(folder: str) -> None:
     """What a program does that is killed: jobs of ten seconds, side by side."""
-    from uas_coverage_env.runner.jobs import Job, Workers
+    from uas_coverage_env.runner.jobs import Job
+    from uas_coverage_env.runner.workers import Workers
 
     with Workers(2) as workers:
         jobs = [Job(str(k), long, (folder, k)) for k in range(4)]

@@ -12,8 +12,8 @@ import pytest
 import some_jobs
 
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.runner import jobs
-from uas_coverage_env.runner.jobs import Job, WorkerLostError, Workers
+from uas_coverage_env.runner.jobs import Job
+from uas_coverage_env.runner.workers import WorkerLostError, Workers
 
 HERE = Path(__file__).parent
 DEADLINE_S = 60.0
@@ -160,7 +160,7 @@ def test_the_processes_end_with_their_owner(tmp_path, number):
 
 
 def test_how_many_there_are_is_what_was_asked_for_or_the_cores(monkeypatch):
-    monkeypatch.setattr(jobs.os, "cpu_count", lambda: 6)
+    monkeypatch.setattr(os, "cpu_count", lambda: 6)
     assert [Workers(count).count for count in (None, 1, 3)] == [6, 1, 3]
     assert str(Workers(3)) == "3 flights side by side"
     assert str(Workers(None, "ray")) == "as many flights side by side as the cluster has cores"

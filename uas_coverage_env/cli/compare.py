@@ -39,8 +39,8 @@ from uas_coverage_env.leaderboard.planner_specs import varied_keys
 from uas_coverage_env.leaderboard.publish import FLIGHTS, FRONT, parquet
 from uas_coverage_env.leaderboard.row import FLOWN
 from uas_coverage_env.leaderboard.sweep import Entry
-from uas_coverage_env.runner.jobs import WorkerLostError, Workers
 from uas_coverage_env.runner.store import STORE, Store, opened, rows_in
+from uas_coverage_env.runner.workers import WorkerLostError, Workers
 from uas_coverage_env.scenario import Scenario, warnings
 
 _REFERENCE = "nearest-waypoint"

@@ -17,8 +17,8 @@ from uas_coverage_env.cli.output import console
 from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_former
 from uas_coverage_env.leaderboard import PlannerSpec, Row, Sweep, scenarios_of
 from uas_coverage_env.leaderboard.row import FLOWN
-from uas_coverage_env.runner.jobs import Workers
 from uas_coverage_env.runner.store import opened
+from uas_coverage_env.runner.workers import Workers
 
 
 def demonstrate_command(

@@ -14,7 +14,7 @@ import typer
 
 from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.runner.jobs import Backend
+from uas_coverage_env.runner.workers import Backend
 
 Asked = TypeVar("Asked")
 Made = TypeVar("Made")

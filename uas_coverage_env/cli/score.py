@@ -14,8 +14,8 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.leaderboard import PlannerSpec, Row
 from uas_coverage_env.leaderboard.sweep import Entry
-from uas_coverage_env.runner.jobs import Workers
 from uas_coverage_env.runner.store import opened
+from uas_coverage_env.runner.workers import Workers
 from uas_coverage_env.tasks.levels import LEVELS
 from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
 from uas_coverage_env.tasks.table import markdown

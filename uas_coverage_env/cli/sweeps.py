@@ -18,8 +18,9 @@ from uas_coverage_env.leaderboard.flying import Kept, fly
 from uas_coverage_env.leaderboard.publish import failures
 from uas_coverage_env.leaderboard.row import FLOWN
 from uas_coverage_env.leaderboard.sweep import Entry, source_of
-from uas_coverage_env.runner.jobs import Job, WorkerLostError, Workers
+from uas_coverage_env.runner.jobs import Job
 from uas_coverage_env.runner.store import Store
+from uas_coverage_env.runner.workers import WorkerLostError, Workers
 
 
 def fly_and_keep(

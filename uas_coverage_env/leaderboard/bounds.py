@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from uas_coverage_env.bound import bound_of
 from uas_coverage_env.leaderboard.row import Row
-from uas_coverage_env.runner.jobs import Job, Workers
+from uas_coverage_env.runner.jobs import Job
+from uas_coverage_env.runner.workers import Workers
 from uas_coverage_env.scenario import Scenario
 
 Bounds = Mapping[tuple[str, int], float]

@@ -18,8 +18,8 @@ from uas_coverage_agents.training.published import published_names
 from uas_coverage_env.cli.options import BackendOption, JobsOption
 from uas_coverage_env.files.output_dir import prepare_folder
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.runner.jobs import WorkerLostError, Workers
 from uas_coverage_env.runner.store import STORE, opened
+from uas_coverage_env.runner.workers import WorkerLostError, Workers
 
 if TYPE_CHECKING:
     from uas_coverage_agents.policy import Policy

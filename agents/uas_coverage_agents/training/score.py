@@ -19,8 +19,9 @@ from uas_coverage_env.leaderboard.flying import fly as fly_entry
 from uas_coverage_env.leaderboard.row import FAILED
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
 from uas_coverage_env.leaderboard.sweep import Entry, source_of
-from uas_coverage_env.runner.jobs import Job, Workers
+from uas_coverage_env.runner.jobs import Job
 from uas_coverage_env.runner.store import Store
+from uas_coverage_env.runner.workers import Workers
 from uas_coverage_env.scenario import Scenario
 
 _FIGURES = {

@@ -51,8 +51,8 @@ def reproduce(
     from uas_coverage_env.cli.output import FAILED, console, one_line
     from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_others
     from uas_coverage_env.leaderboard import Row
-    from uas_coverage_env.runner.jobs import Workers
     from uas_coverage_env.runner.store import opened
+    from uas_coverage_env.runner.workers import Workers
 
     _need_matplotlib()
     published = paper_named(paper)

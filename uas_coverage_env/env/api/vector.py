@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
@@ -31,9 +31,6 @@ from uas_coverage_env.env.report import FILTERED, STATUS
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
 from uas_coverage_env.world import Command
-
-if TYPE_CHECKING:
-    from uas_coverage_env.env.gpu.missions import CudaMissions
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next_step",
@@ -410,87 +407,3 @@ class CoverageVectorEnv(Versioned, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         self._tiles.see(batch.lanes.mission.tolist(), batch.scenario_of, batch.worlds.x[:, :, :3])
         if self.render_mode == "human":
             self.render()
-
-
-@overload
-def vector_env(
-    num_envs: int = 1,
-    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
-    *,
-    device: Literal["cuda"],
-    **settings: Unpack[MissionKeywords],
-) -> "CudaMissions": ...
-
-
-@overload
-def vector_env(
-    num_envs: int = 1,
-    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
-    *,
-    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-    threads: int = 1,
-    copy: bool = True,
-    render_mode: str | None = None,
-    device: Literal["cpu"] = "cpu",
-    **settings: Unpack[MissionKeywords],
-) -> CoverageVectorEnv: ...
-
-
-@takes_settings
-def vector_env(
-    num_envs: int = 1,
-    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
-    *,
-    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-    threads: int = 1,
-    copy: bool = True,
-    render_mode: str | None = None,
-    device: Literal["cpu", "cuda"] = "cpu",
-    **settings: Unpack[MissionKeywords],
-) -> "CoverageVectorEnv | CudaMissions":
-    """Many missions at once; the same as `gymnasium.make_vec("UASCoverage-v0", num_envs)`.
-
-    Args:
-        num_envs: How many.
-        scenario: See `CoverageVectorEnv`; likewise the others.
-        autoreset_mode: An `AutoresetMode`, or its value.
-        threads: How many of numba's threads share the missions.
-        copy: Whether observations are arrays of their own.
-        render_mode: None, "rgb_array", "rgb_array_tiled" or "human".
-        device: "cpu"; or "cuda": on a GPU (extra `gpu`), see `CudaMissions`, whose arrays stay
-            there and are always overwritten.
-        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
-        dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
-        return_mode: The world flies a UAS home in time, whatever its actions.
-        safety_filter: The world replaces commands after which a UAS could not brake in time.
-        reward_weights: Mapping from reward term to weight; the other terms keep theirs.
-        max_cycles: Time limit of the mission [steps]; None: the scenario's `max_steps`.
-        observation: Blocks that the observation is made of, see `ObservationBlock`; the name of an
-            observation (`default`, `local`, `grid`); None: those of the version.
-        reward: Terms that the reward is made of, see `RewardTerm`; None: those of the version.
-        disturbances: Blocks that act on the world, see `Disturbance`; None: those of the scenario;
-            (): none.
-        mask_in_observation: With discrete actions (`waypoint`), an observation is a dictionary of
-            `observation` and `action_mask`, and the infos have no mask. For libraries that do not
-            read infos.
-        images_apart: An observation with pictures (`grid`) is a dictionary of `observation` and a
-            uint8 `Box` (channels, rows, columns; 255 for 1) for each of them; a picture alone is
-            that `Box`.
-        flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
-            libraries that make an array of every info (TorchRL). None: as in the version.
-
-    Raises:
-        ValueError: An argument is none of what is allowed; says what is.
-        ImportError: "cuda", and numba-cuda is not installed.
-        RuntimeError: "cuda", and there is no GPU.
-    """
-    both: dict[str, Any] = {
-        "autoreset_mode": autoreset_mode, "threads": threads, "render_mode": render_mode, **settings
-    }  # fmt: skip
-    if device == "cuda":
-        from uas_coverage_env.env.gpu.missions import CudaMissions
-
-        return CudaMissions(num_envs, scenario, **both)
-    if device != "cpu":
-        raise ValueError(f"device is {device!r}; it is one of cpu, cuda")
-    return CoverageVectorEnv(num_envs, scenario, copy=copy, **both)

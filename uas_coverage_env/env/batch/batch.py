@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.compiled.kernels import machine_code
-from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.actions.given import accept_of_lanes
 from uas_coverage_env.env.batch.checkpoint import changing, checked
@@ -23,17 +22,17 @@ from uas_coverage_env.env.batch.kernel import (
     step_batch_in_threads,
 )
 from uas_coverage_env.env.batch.memory import (
+    AUTORESET,
     DISABLED,
     DRAW,
     FLY,
-    NEXT_STEP,
     REST,
     SAME_STEP,
-    WAITS,
     SubEnvironments,
     new_missions,
 )
 from uas_coverage_env.env.batch.scenes import change_scenes, install_scenes
+from uas_coverage_env.env.batch.source import lane_seeds
 from uas_coverage_env.env.batch.state_dict import (
     check_like,
     fields_of,
@@ -54,15 +53,6 @@ from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.simulation.world import swarm_state
 from uas_coverage_env.world import Command, SwarmState, WorldState
 from uas_coverage_env.world.arena import ARENA
-
-AUTORESET = {
-    "next_step": NEXT_STEP,
-    "same_step": SAME_STEP,
-    "disabled": DISABLED,
-    "rest": WAITS,
-}
-"""When a mission that has ended begins anew; with `rest` not at all, so that each lane flies one
-mission and `(lanes.terminated | lanes.truncated).all()` says when all have ended."""
 
 _MOST_LANES = 2**20
 
@@ -437,29 +427,6 @@ class CoverageBatch:
         begins_later = self._begins_here and self.autoreset == SAME_STEP
         autoreset = DISABLED if begins_later else self.autoreset
         return BatchRules(rules, autoreset, lane_code(version, settings.observation_size))
-
-
-def lane_seeds(seed: Any, num_envs: int) -> list[int | None]:
-    """The seed of each environment, see `CoverageBatch.seed`.
-
-    Raises:
-        ValueError: A seed is negative or too large, or their number is wrong.
-    """
-    if isinstance(seed, int | np.integer):
-        seeds: list[int | None] = [int(seed) + lane for lane in range(num_envs)]
-    elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
-        seeds = list(seed)
-    else:
-        raise ValueError(f"seed is {seed!r}; give a whole number, or one for each environment")
-    if len(seeds) != num_envs:
-        raise ValueError(f"{len(seeds)} seeds for {num_envs} environments; give one for each")
-    for lane, value in enumerate(seeds):
-        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        if value is not None and (not whole or not 0 <= value < SEEDS):
-            raise ValueError(
-                f"seed of environment {lane} is {value!r}; give a whole number from 0 to 2**64 - 1"
-            )
-    return seeds
 
 
 def _check_count(name: str, count: Any, most: int) -> None:

@@ -19,6 +19,15 @@ NEXT_STEP, SAME_STEP, DISABLED, WAITS = range(4)
 then a step with one that has ended is refused (DISABLED), or it rests and is paid nothing (WAITS).
 """
 
+AUTORESET = {
+    "next_step": NEXT_STEP,
+    "same_step": SAME_STEP,
+    "disabled": DISABLED,
+    "rest": WAITS,
+}
+"""When a mission that has ended begins anew; with `rest` not at all, so that each lane flies one
+mission and `(lanes.terminated | lanes.truncated).all()` says when all have ended."""
+
 FLY, REST, DRAW = -3, -2, -1
 """What a lane does in the coming step: fly, nothing, or begin a mission that is drawn; a number
 from 0 on begins a mission of that scenario."""

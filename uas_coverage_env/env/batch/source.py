@@ -1,4 +1,4 @@
-"""Where the missions of a batch come from."""
+"""Where the missions of a batch come from, and from which seeds."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.env.actions.given import Actions
 from uas_coverage_env.env.batch.memory import MissionPool, SubEnvironments
 from uas_coverage_env.env.episode.memory import Tables
@@ -115,3 +116,26 @@ class LaneMissions(Protocol):
     def limits(self, begun: NDArray[np.bool_]) -> dict[str, Any]:
         """What `lanes.scenario` may be, see `check_values`; empty: any."""
         ...
+
+
+def lane_seeds(seed: Any, num_envs: int) -> list[int | None]:
+    """The seed of each environment, see `CoverageBatch.seed`.
+
+    Raises:
+        ValueError: A seed is negative or too large, or their number is wrong.
+    """
+    if isinstance(seed, int | np.integer):
+        seeds: list[int | None] = [int(seed) + lane for lane in range(num_envs)]
+    elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
+        seeds = list(seed)
+    else:
+        raise ValueError(f"seed is {seed!r}; give a whole number, or one for each environment")
+    if len(seeds) != num_envs:
+        raise ValueError(f"{len(seeds)} seeds for {num_envs} environments; give one for each")
+    for lane, value in enumerate(seeds):
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if value is not None and (not whole or not 0 <= value < SEEDS):
+            raise ValueError(
+                f"seed of environment {lane} is {value!r}; give a whole number from 0 to 2**64 - 1"
+            )
+    return seeds

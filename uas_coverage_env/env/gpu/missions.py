@@ -16,11 +16,11 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from uas_coverage_env.env.actions.given import accept_of_lanes
-from uas_coverage_env.env.batch.batch import lane_seeds
 from uas_coverage_env.env.batch.checkpoint import changing, checked
 from uas_coverage_env.env.batch.memory import DRAW, SWARM_REWARD, Missions, new_missions
 from uas_coverage_env.env.batch.pool import MissionPool, ScenarioPool
 from uas_coverage_env.env.batch.scenes import SceneChanges, SceneLane, install_scenes
+from uas_coverage_env.env.batch.source import lane_seeds
 from uas_coverage_env.env.batch.state_dict import check_like, fields_of, records_of
 from uas_coverage_env.env.episode.act import acting_of
 from uas_coverage_env.env.episode.memory import TABLES
