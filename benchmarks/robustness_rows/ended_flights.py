@@ -56,7 +56,8 @@ def fly_and_end(folder: Path, how: str, seed: int) -> dict[str, Any]:
         status = _wait(child)
     code, text = os.waitstatus_to_exitcode(status), said.read_text(errors="replace")
     # by the signal, as a process that has not begun to handle it, or by a code of its own
-    crashed = "Traceback" in text or code not in (0, 1, -getattr(signal, how))
+    number = getattr(signal, how)
+    crashed = "Traceback" in text or code not in (0, 1, -number, 128 + number)
     return {"ended": bool(ended), "code": code, "crashed": crashed, "said": text[-600:] * crashed}
 
 

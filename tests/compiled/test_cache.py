@@ -169,7 +169,8 @@ def test_the_plant_flies_by_the_power_train_as_it_is_now(tmp_path):
     program = """
 import json
 import numpy as np
-from uas_coverage_env.vehicle import N_INPUTS, N_STATES, compile_vehicle, load_vehicle, plant_step
+from uas_coverage_env.vehicle import compile_vehicle, load_vehicle, plant_step
+from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
 vehicle, x = compile_vehicle(load_vehicle("s500_v2"), 0.1)[()], np.zeros(N_STATES)
 print(json.dumps(plant_step(vehicle, x, np.zeros(N_INPUTS), x.copy())))
 """

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from keyword import iskeyword
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from uas_coverage_env.files.digits import three_digits
@@ -17,12 +18,12 @@ _UNITS = {"m": "m", "Wh": "Wh", "s": "s", "mps": "m/s", "rad": "rad", "share": "
 _KINDS = {
     bool: "truth",
     int: "whole number from 0 to 1e12",
-    float: "finite number up to 1e12",
+    float: "finite number",
     list: "list",
     dict: "mapping",
     str: "text",
 }
-_LARGEST = 1e12
+_LARGEST = 10**12
 _SCALES = {"%": 100.0, "ms": 1000.0}
 
 Over = Literal["mean", "average", "total", "median", "least", "most"]
@@ -108,7 +109,11 @@ class Figure:
             json.dumps(value, allow_nan=False)
             return self.kind(value)
         number = self.kind(value)
-        if number != value or (self.kind is int and number < 0) or abs(number) > _LARGEST:
+        if (
+            number != value
+            or (self.kind is int and not 0 <= number <= _LARGEST)
+            or not isfinite(number)
+        ):
             raise ValueError(f"it is {value!r}, which is no {_KINDS[self.kind]}")
         return number
 

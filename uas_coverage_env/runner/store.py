@@ -12,6 +12,7 @@ import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar, get_args, get_type_hints
@@ -24,7 +25,6 @@ _LOCK = ".lock"
 _SCHEMA_VERSION = 3
 _SQL_TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
 _FORMER = ("test/scores.jsonl", "validation/scores.jsonl", "demonstrations.json")
-_LARGEST = 1e12  # of anything that is measured; NaN is not below it
 _ANEW = "give another --out, or add --overwrite to begin anew"
 
 Record = TypeVar("Record")
@@ -209,7 +209,7 @@ def _checked(record: type[Record], values: Sequence[Any]) -> Record:
             value = bool(value)
         elif float in kinds and type(value) is int:
             value = float(value)
-        bounded = not isinstance(value, float) or abs(value) <= _LARGEST
+        bounded = not isinstance(value, float) or isfinite(value)
         if type(value) not in kinds or not bounded or (type(value) is int and value < 0):
             raise ValueError(f"{name} of a flight is {repr(value)[:40]}")
         found.append(value)
