@@ -162,8 +162,12 @@ def test_docstrings_say_what_the_version_has():
 
 
 def test_an_environment_of_a_version_can_be_pickled():
-    settings = pickle.loads(pickle.dumps(MissionSettings()))
-    assert settings.version is V0
+    assert pickle.loads(pickle.dumps(MissionSettings())).version is V0
+    there = pickle.loads(pickle.dumps(NextParallelEnv(practice_ground())))
+    here = NextParallelEnv(practice_ground())
+    assert type(there).version == NEXT
+    for one, other in zip(flown(there)[0], flown(here)[0], strict=True):
+        assert all(np.array_equal(one[agent], other[agent]) for agent in one)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
-from types import MappingProxyType
 from typing import Any
 
 from uas_coverage_env.env.actions import ACTIONS, ActionKind
@@ -26,7 +25,7 @@ class Version:
         name: What comes behind the underscore: `v0`.
         observation: Blocks that an observation is made of, unless others are given.
         reward: Terms that the reward is made of, unless others are given.
-        actions: Kinds that `action=` knows by their names; the first is the default.
+        actions: Kinds that `action=` knows by their names.
         infos: What is told of a UAS.
         observations: What `observation=` knows by name: name -> blocks.
         flat_infos: Whether infos have no sub-dictionaries, unless it is said otherwise.
@@ -38,7 +37,7 @@ class Version:
     actions: tuple[ActionKind, ...]
     infos: tuple[InfoField, ...] = INFOS
     observations: Mapping[str, tuple[ObservationBlock, ...]] = field(
-        default_factory=lambda: MappingProxyType({}), compare=False
+        default_factory=dict, compare=False
     )
     flat_infos: bool = False
 
