@@ -1,7 +1,8 @@
-"""Tables of pages on the environments, each made from what decides it."""
+"""Tables and docstrings on the environments, each made from what decides it."""
 
 import inspect
 import re
+import textwrap
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -19,6 +20,7 @@ from uas_coverage_env.env.actions.given import actions_of
 from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 from uas_coverage_env.env.batch.memory import FINAL, LANES
 from uas_coverage_env.env.episode.memory import LEARNERS
+from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, inside_name
 from uas_coverage_env.env.observation import OBSERVATION, grid
 from uas_coverage_env.env.rendering.screen import RENDER_MODES
 
@@ -194,3 +196,21 @@ def without_meanings(rows: str) -> str:
     """Of a table of features, the columns of indices and names."""
     cut = [line.split("|")[1:3] for line in rows.splitlines()]
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
+
+
+_SETTING = re.compile(r"^( +)action: (?:.*\n)+?\1 +.*as in the version\.\n", re.MULTILINE)
+"""The settings in a docstring: from the first of them to the end of the last."""
+
+
+def settings_text() -> str:
+    """What `MissionSettings` says of its attributes, under the names of the keyword arguments."""
+    text = inspect.getdoc(MissionSettings) or ""
+    listed = textwrap.dedent(text.partition("Attributes:\n")[2].partition("\n\n")[0])
+    said = dict(each.split(":", 1) for each in re.split(r"^(?=\w)", listed, flags=re.M) if each)
+    names = [(name, said[inside_name(name)].rstrip()) for name in MissionKeywords.__annotations__]
+    return "".join(f"{name}:{meaning}\n" for name, meaning in names)
+
+
+def with_settings_written_out(source: str) -> str:
+    """Source code in which docstrings say of the settings what `MissionSettings` says."""
+    return _SETTING.sub(lambda match: textwrap.indent(settings_text(), match[1]), source)

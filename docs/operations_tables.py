@@ -104,8 +104,8 @@ def town_not_read() -> Table:
 def exported_files() -> Table:
     """What an export writes, and what reads it."""
     rows = [
-        (f"`{ending}`", ", ".join(f"`{kind}`" for kind in formats.split(", ")), whom, holds)
-        for ending, (formats, whom, holds) in ENDINGS.items()
+        (f"`{ending}`", ", ".join(f"`{kind}`" for kind in formats.split(", ")), reader, holds)
+        for ending, (formats, reader, holds) in ENDINGS.items()
     ]
     return ("file", "`--format`", "for", "holds"), rows
 

@@ -28,6 +28,7 @@ from environment_tables import (
     environments,
     observation_groups,
     picture_channels,
+    with_settings_written_out,
     without_meanings,
 )
 from families_picture import families_table
@@ -40,7 +41,6 @@ from uas_coverage_env.env import (
     CoverageVectorEnv,
 )
 from uas_coverage_env.env.api.aec import in_turns
-from uas_coverage_env.env.api.documentation import with_settings_written_out
 from uas_coverage_env.env.gpu.refused import REFUSED
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, full_state, local
 from uas_coverage_env.env.observation.layout import layout_table

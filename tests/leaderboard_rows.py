@@ -1,4 +1,4 @@
-"""Rows of flights: of such as nobody has flown, and of those that a folder holds."""
+"""Rows of flights: some that were never flown, and those that a folder holds."""
 
 import dataclasses
 from pathlib import Path

@@ -1,5 +1,6 @@
 """A version of the environments is a set of tuples: they act everywhere, and beside the others."""
 
+import dataclasses
 import importlib
 import inspect
 import json
@@ -32,7 +33,8 @@ from uas_coverage_env.env import (
 from uas_coverage_env.env.api.parallel import CoverageParallelEnv
 from uas_coverage_env.env.episode.settings import MissionKeywords, inside_name
 from uas_coverage_env.env.policy.interface import MissionInterface
-from uas_coverage_env.env.report import INFOS
+from uas_coverage_env.env.report import FILTERED, FIRST_TERM, INFOS, InfoField
+from uas_coverage_env.env.report import REWARD as REWARD_COLUMN
 from uas_coverage_env.env.versions import V0, Version
 
 
@@ -129,8 +131,29 @@ def test_infos_are_those_of_the_version():
     terms = [f"reward_terms_{term.name}" for term in NEXT.reward]
     assert all(list(info) == ["status", *terms] for info in infos.values())
     *_, told = NextVectorEnv(2, practice_ground()).reset(seed=0)
-    assert "contact" not in told
-    assert "status" in told
+    assert {"status", "scenario", "reward_terms_hurry"} <= told.keys()
+    assert not {"contact", "covered", "energy_Wh"} & told.keys()
+    *_, told = NextSwarmEnv(practice_ground()).reset(seed=0)
+    assert "covered" not in told
+
+
+def test_what_is_told_of_amounts_is_told_of_the_swarm_as_their_sum():
+    paid = InfoField("paid", "reward of the step", REWARD_COLUMN, of_amounts=True)
+    late = InfoField("hurry", "the same as the term", FIRST_TERM + len(REWARD), of_amounts=True)
+    filtered = InfoField("filtered_now", "of the first", FILTERED, of_swarm=True, flag=True)
+    version = dataclasses.replace(NEXT, infos=(*INFOS, paid, late, filtered))
+    kinds = {"version": version}
+    single = type("Single", (CoverageSwarmEnv,), kinds)(practice_ground())
+    many = type("Many", (CoverageVectorEnv,), kinds)(2, practice_ground())
+    single.reset(seed=0)
+    many.reset(seed=0)
+    action = np.full(single.action_space.shape, 0.3, np.float32)
+    _, reward, *_, one = single.step(action)
+    _, rewards, *_, all_ = many.step(np.stack([action] * 2))
+    assert one["paid"] == all_["paid"][1] == reward == rewards[1]
+    assert one["hurry"] == all_["hurry"][0] == one["reward_terms_hurry"] < 0.0
+    assert one["energy_Wh"] == all_["energy_Wh"][0] > 0.0
+    assert (one["filtered_now"], all_["filtered_now"].tolist()) == (False, [False, False])
 
 
 def test_what_python_alone_flies_is_the_same(tmp_path):

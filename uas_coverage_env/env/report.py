@@ -25,8 +25,8 @@ class InfoField:
         name: Its key.
         meaning: In words; Markdown.
         column: Where it stands in the report; with `of_amounts`, in the amounts.
-        of_amounts: It is one of the amounts.
-        of_swarm: It is the same for all UAS, or has a sum for the swarm.
+        of_amounts: It is one of the amounts; the swarm has their sum.
+        of_swarm: It is the same for all UAS, and the swarm's.
         flag: It is True or False.
         absent: What it is of a UAS that the mission does not have.
     """
@@ -72,7 +72,6 @@ INFOS = (
         "energy drawn by this UAS so far [Wh]",
         ENERGY,
         of_amounts=True,
-        of_swarm=True,
     ),
 )
 """The infos of `uas_coverage_v0`, in their order; after them come the terms of the reward, the mask

@@ -1,32 +1,11 @@
-"""What signatures and docstrings say of observations, rewards, infos and settings."""
+"""What docstrings say of the observations, rewards and infos of a version."""
 
-import inspect
-import re
-import textwrap
 from typing import Any, ClassVar
 
-from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, inside_name
 from uas_coverage_env.env.observation.layout import layout_table
 from uas_coverage_env.env.report import InfoField
 from uas_coverage_env.env.rewards.terms import rewards_table
 from uas_coverage_env.env.versions import V0, Version
-
-_SETTING = re.compile(r"^( +)action: (?:.*\n)+?\1 +.*as in the version\.\n", re.MULTILINE)
-"""The settings in a docstring: from the first of them to the end of the last."""
-
-
-def settings_text() -> str:
-    """What `MissionSettings` says of its attributes, under the names of the keyword arguments."""
-    text = inspect.getdoc(MissionSettings) or ""
-    listed = textwrap.dedent(text.partition("Attributes:\n")[2].partition("\n\n")[0])
-    said = dict(each.split(":", 1) for each in re.split(r"^(?=\w)", listed, flags=re.M) if each)
-    names = [(name, said[inside_name(name)].rstrip()) for name in MissionKeywords.__annotations__]
-    return "".join(f"{name}:{meaning}\n" for name, meaning in names)
-
-
-def with_settings_written_out(source: str) -> str:
-    """Source code in which docstrings say of the settings what `MissionSettings` says."""
-    return _SETTING.sub(lambda match: textwrap.indent(settings_text(), match[1]), source)
 
 
 def infos_text(infos: tuple[InfoField, ...]) -> str:

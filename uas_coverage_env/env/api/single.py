@@ -21,7 +21,7 @@ from uas_coverage_env.env.episode.sequence import MissionSequence
 from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, takes_settings
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS
 from uas_coverage_env.env.rendering.screen import RENDER_FPS, RENDER_MODES, Screen, offered
-from uas_coverage_env.env.report import COVERED, ENERGY, FIRST_TERM, STATUS
+from uas_coverage_env.env.report import FIRST_TERM, STATUS
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
@@ -254,12 +254,14 @@ class CoverageSwarmEnv(Versioned, gymnasium.Env[Any, NDArray[Any]]):
         }
         for name in self._missions.source.names[len(uas) :]:
             uas[name] = absent(uas[episode.names[0]], episode.settings.version.infos)
-        told: dict[str, Any] = {
-            "reward_terms": dict(zip(episode.settings.term_names, sums[FIRST_TERM:], strict=True)),
-            "covered": report[0][COVERED],
-            "energy_Wh": sums[ENERGY],
-            "uas": uas,
-        }
+        terms = dict(zip(episode.settings.term_names, sums[FIRST_TERM:], strict=True))
+        told: dict[str, Any] = {"reward_terms": terms}
+        for field in episode.settings.version.infos:
+            if field.of_amounts:
+                told[field.name] = sums[field.column]
+            elif field.of_swarm:
+                told[field.name] = uas[episode.names[0]][field.name]
+        told["uas"] = uas
         if episode.settings.chooses and not episode.settings.mask_in_observation:
             told["action_mask"] = self._action_mask()
         return told

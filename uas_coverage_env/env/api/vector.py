@@ -17,10 +17,9 @@ from uas_coverage_env.env.api.forms import observation_space, shown
 from uas_coverage_env.env.api.spec import plain_spec
 from uas_coverage_env.env.batch.batch import CoverageBatch
 from uas_coverage_env.env.batch.memory import (
-    SWARM_COVERED,
-    SWARM_ENERGY,
     SWARM_FIRST_TERM,
     SWARM_REWARD,
+    swarm_column,
 )
 from uas_coverage_env.env.episode.infos import flat
 from uas_coverage_env.env.episode.sequence import check_options
@@ -360,12 +359,14 @@ class CoverageVectorEnv(Versioned, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         for column, name in enumerate(self._batch.settings.term_names, SWARM_FIRST_TERM):
             terms[name] = swarm[:, column]
         absent = report[:, :, STATUS] == ABSENT
-        infos: dict[str, Any] = {
-            "reward_terms": terms,
-            "covered": swarm[:, SWARM_COVERED].astype(np.int64),
-            "energy_Wh": swarm[:, SWARM_ENERGY],
-            "scenario": self._batch.lanes.scenario * mask,
-        }
+        infos: dict[str, Any] = {"reward_terms": terms}
+        for field in self.version.infos:
+            if field.of_amounts:
+                infos[field.name] = swarm[:, swarm_column(field.column)]
+            elif field.of_swarm:
+                told = report[:, 0, field.column]
+                infos[field.name] = told > 0 if field.flag else told.copy()
+        infos["scenario"] = self._batch.lanes.scenario * mask
         for field in self.version.infos:
             if not (field.of_amounts or field.of_swarm):
                 column = report[:, :, field.column]

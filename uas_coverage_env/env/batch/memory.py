@@ -11,7 +11,7 @@ from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.episode.memory import LEARNERS, SCRATCH, Learners, Scratch
 from uas_coverage_env.env.observation import K_WAYPOINTS
-from uas_coverage_env.env.report import REPORT_SIZE
+from uas_coverage_env.env.report import ENERGY, FIRST_TERM, REPORT_SIZE
 from uas_coverage_env.world import WorldState
 
 NEXT_STEP, SAME_STEP, DISABLED, WAITS = range(4)
@@ -35,6 +35,11 @@ from 0 on begins a mission of that scenario."""
 SWARM_ENERGY, SWARM_COVERED, SWARM_REWARD, SWARM_FIRST_TERM = range(4)
 """Columns of a swarm's report: sum of ENERGY, waypoints covered, the reward, and from
 SWARM_FIRST_TERM on the sums of its terms."""
+
+
+def swarm_column(column: int) -> int:
+    """Where the sum of a column of the amounts stands."""
+    return SWARM_ENERGY if column == ENERGY else column - FIRST_TERM + SWARM_FIRST_TERM
 
 
 class MissionPool(NamedTuple):
