@@ -147,9 +147,9 @@ def score(
         split: validation or test.
         swarm_of: For a policy of the whole swarm, see `as_planner`.
         batch: For a policy that takes the observations of many at once, (N, …), and returns N
-            actions: how many missions are flown side by side, in a fiftieth of the time. The same
-            values to the last digit, where it answers each row as it would by itself; figures that
-            a batch does not measure are None. None: missions are flown one by one.
+            actions: how many missions are flown side by side, which is much faster. The same values
+            to the last digit, where it answers each row as it would by itself; figures that a
+            batch does not measure are None. None: missions are flown one by one.
         on_mission: Called with each mission that was flown.
         **chosen: For a policy: action, observation and so on, where they are not the level's.
 
