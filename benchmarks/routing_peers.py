@@ -26,18 +26,18 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from scale import town
-from uas_coverage_baselines.routing import (
+from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
+
+from uas_coverage_env import MissionBrief
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.mission import first_sight
+from uas_coverage_env.planning.routing import (
     Routes,
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
-from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
-
-from uas_coverage_env import MissionBrief
-from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.mission import first_sight
 
 console = Console(width=130)
 _MS = 1000.0

@@ -29,13 +29,6 @@ import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from uas_coverage_baselines.routing import (
-    Routes,
-    RoutingTask,
-    SearchEffort,
-    empty_routes,
-    improve_routes,
-)
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
@@ -44,6 +37,13 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.leaderboard import seed_range
+from uas_coverage_env.planning.routing import (
+    Routes,
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+)
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.world import build_arena

@@ -82,7 +82,7 @@ QUICK = {
         "test_an_unknown_solver_is_refused_with_the_names_there_are"
     ),
     "mission/test_blocked.py": "",
-    "mission/test_legs.py": "",
+    "routing/test_legs.py": "",
     "missions/test_independent_check.py": "only test_it_agrees_on_a_mission_that_ends_well",
     "operations/test_export.py": (
         "only test_every_corner_of_a_waypoint_file_is_where_it_was_planned"

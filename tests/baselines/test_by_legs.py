@@ -9,9 +9,9 @@ from uas_coverage_baselines.by_legs.follower import LegFollower
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.flight.metrics import coverage
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.planning.execution.lateness import Timed, pairs_of
 from uas_coverage_env.planning.execution.leg_model import Autopilot
+from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.scenario import Execution, Scenario
 from uas_coverage_env.world import Velocity
 

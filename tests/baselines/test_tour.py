@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.tour import Tour, TourOptions
 from uas_coverage_baselines.tour.schedule import Schedule, View
 
@@ -11,6 +10,7 @@ from uas_coverage_env.entities.state import LOST
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.flight.metrics import accomplished, coverage, home
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.routing import SearchEffort
 from uas_coverage_env.scenario import Scenario, Wind, generate_scenario, sample_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.layout import DOD

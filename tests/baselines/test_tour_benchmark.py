@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from uas_coverage_baselines.routing import empty_routes
 
+from uas_coverage_env.planning.routing import empty_routes
 from uas_coverage_env.scenario import generate_scenario
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from uas_coverage_baselines.routing import (
+
+from uas_coverage_env.planning.routing import (
     Routes,
     RoutingTask,
     SearchEffort,
@@ -16,9 +17,9 @@ from uas_coverage_baselines.routing import (
     empty_routes,
     improve_routes,
 )
-from uas_coverage_baselines.routing import search as search_module
-from uas_coverage_baselines.routing.search import OrderSearch
-from uas_coverage_baselines.routing.window import RouteWindow
+from uas_coverage_env.planning.routing import search as search_module
+from uas_coverage_env.planning.routing.search import OrderSearch
+from uas_coverage_env.planning.routing.window import RouteWindow
 
 SOME = SearchEffort(20_000)
 seeds = st.integers(0, 10_000)

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_order_search import seconds_of, task
-from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
-from uas_coverage_baselines.routing.trips import FreshPacks, improve_trips
+
+from uas_coverage_env.planning.routing import SearchEffort, empty_routes, improve_routes
+from uas_coverage_env.planning.routing.trips import FreshPacks, improve_trips
 
 SOME = SearchEffort(20_000)
 SWAP_S = 60.0

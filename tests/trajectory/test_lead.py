@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from small_fleets import every_waypoint, field
-from uas_coverage_baselines.routing import SearchEffort
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory.flight_model import (
     flight_model,
@@ -21,6 +20,7 @@ from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY, WRENCH
 from uas_coverage_env.flight.metrics import accomplished, energy_Wh
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M, LearntWind, in_disturbances
+from uas_coverage_env.planning.routing import SearchEffort
 from uas_coverage_env.scenario import Wind
 from uas_coverage_env.vehicle.layout import N_INPUTS, VX, VY, VZ
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.planning.reserves import ROUTED
-from uas_coverage_env.vehicle.range import flight_seconds, speeds_of
+from uas_coverage_env.vehicle.range import ROUTED, flight_seconds, speeds_of
 from uas_coverage_env.world import build_arena
 from uas_coverage_env.world.routes import CLEAR, ROUND_CORNER, crossing, route
 

@@ -2,16 +2,13 @@
 
 Each number with the command that gave it. Where that says "chosen by hand", no record of a
 measurement exists; the command then shows what it costs today. Models of flight time that are
-rules of the world stand with them: `vehicle.range.CALIBRATED`, `autopilot.return_mode.RETURN_MODE`,
-`scenario.endurance.GENERATED`, `env.observation.home.OBSERVED`.
+rules of the world stand with them: `vehicle.range.CALIBRATED` and `ROUTED`,
+`autopilot.return_mode.RETURN_MODE`, `scenario.endurance.GENERATED`, `env.observation.home.OBSERVED`.
 """
 
 from typing import NamedTuple
 
 from uas_coverage_env.vehicle.range import TravelTimeModel
-
-ROUTED = TravelTimeModel()
-"""Of `mission.Legs`, which compares routes: the limits of the vehicle, nothing fitted."""
 
 TOUR = TravelTimeModel(landing_s=3.0)
 """Of `tour`: `ROUTED`, and from full speed over the start to rest on it. Chosen by hand;

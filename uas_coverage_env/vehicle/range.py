@@ -48,6 +48,10 @@ CALIBRATED = TravelTimeModel(level_s=7.0, vertical_s=1.0)
 """What `mission.Range` answers. Fitted to flown returns in generated towns of seeds below 1200;
 `benchmarks/returns.py` flies others."""
 
+ROUTED = TravelTimeModel()
+"""Of `mission.Ways` and `routing.Legs`, which compare routes: the limits of the vehicle, nothing
+fitted."""
+
 
 def level_seconds(model: TravelTimeModel, speeds: SpeedLimits, way_m: Any) -> Any:
     """Time of level flight, numbers or arrays [s]; also compiled, see `flight_seconds`.

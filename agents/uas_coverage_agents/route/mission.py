@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from uas_coverage_agents.route.clock import Mission
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
+from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import SwarmState, build_arena
 

@@ -10,11 +10,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_env.geometry.nearest import nearest_on_segment
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.planning.execution.leg_model import Autopilot, Followed, follow
 from uas_coverage_env.planning.execution.separation import Waits
+from uas_coverage_env.planning.routing.terrain import Terrain
 from uas_coverage_env.scenario import Execution
 from uas_coverage_env.world.routes import CLEAR, crossing, route
 

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs.follower import LegFollower
-from uas_coverage_baselines.routing import (
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission.handover import Handover
+from uas_coverage_env.planning.reserves import BY_LEGS, BY_LEGS_RESERVE
+from uas_coverage_env.planning.routing import (
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
-from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.mission.handover import Handover
-from uas_coverage_env.planning.reserves import BY_LEGS, BY_LEGS_RESERVE
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import Command, SwarmState
 

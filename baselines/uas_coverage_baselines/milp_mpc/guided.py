@@ -1,7 +1,7 @@
 """`milp-mpc-guided`: the same OCP along a global order of the waypoints.
 
 What the paper's planner loses, it loses in the order of the waypoints. Here the order of the whole
-swarm is searched apart (`uas_coverage_baselines.routing`) and given to the OCP as a terminal cost,
+swarm is searched apart (`planning.routing`) and given to the OCP as a terminal cost,
 the time still to go along one's own order, and as the few waypoints that get binaries.
 """
 
@@ -20,10 +20,10 @@ from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
-from uas_coverage_baselines.routing import Routes
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 from uas_coverage_env.entities.commands import HOME, Mode
 from uas_coverage_env.mission import MissionBrief, Ways, first_sight
+from uas_coverage_env.planning.routing import Routes
 from uas_coverage_env.vehicle.layout import VX, VY
 from uas_coverage_env.world import SwarmState
 

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import SETTLING_S
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.mission import MissionBrief, Ways
-from uas_coverage_env.planning.reserves import ROUTED
 from uas_coverage_env.vehicle.params import return_threshold
-from uas_coverage_env.vehicle.range import dod_per_s, flight_seconds, speeds_of
+from uas_coverage_env.vehicle.range import ROUTED, dod_per_s, flight_seconds, speeds_of
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.problem import TourSegment
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
-from uas_coverage_baselines.routing import (
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.reserves import ORDER_GUIDE, ORDER_GUIDE_RESERVE
+from uas_coverage_env.planning.routing import (
     Routes,
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
-from uas_coverage_baselines.routing.window import RouteWindow
-from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.legs import Legs
-from uas_coverage_env.planning.reserves import ORDER_GUIDE, ORDER_GUIDE_RESERVE
+from uas_coverage_env.planning.routing.legs import Legs
+from uas_coverage_env.planning.routing.window import RouteWindow
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState
 

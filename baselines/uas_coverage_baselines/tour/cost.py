@@ -15,9 +15,8 @@ from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake, mov
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.state import WIND
 from uas_coverage_env.geometry.segments import cylinder_clearance, segment_meets, signed_distance
-from uas_coverage_env.planning.reserves import ROUTED
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle.range import SpeedLimits, flight_seconds
+from uas_coverage_env.vehicle.range import ROUTED, SpeedLimits, flight_seconds
 from uas_coverage_env.world.height import in_landing_zone
 from uas_coverage_env.world.routes import box_apart, route
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from uas_coverage_baselines.by_legs.mission import LegMission
-from uas_coverage_baselines.routing import Routes, SearchEffort
 from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
 from uas_coverage_baselines.tour.flight_plan import improve
 from uas_coverage_baselines.tour.pursuit import LEGS, PursuitTask, brake_seconds, empty_plan
@@ -25,6 +24,7 @@ from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.learnt_wind import LearntWind, in_disturbances
 from uas_coverage_env.mission.recall import Recall
+from uas_coverage_env.planning.routing import Routes, SearchEffort
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import Arena, Command, GoTo, SwarmState, Velocity
 

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import (
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M
+from uas_coverage_env.planning.reserves import TOUR, TOUR_RESERVE, TOUR_SCARCE_RESERVE
+from uas_coverage_env.planning.routing import (
     Routes,
     RoutingTask,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
-from uas_coverage_baselines.routing.trips import FreshPacks, Packs, improve_trips
-from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M
-from uas_coverage_env.mission.legs import Legs
-from uas_coverage_env.planning.reserves import TOUR, TOUR_RESERVE, TOUR_SCARCE_RESERVE
+from uas_coverage_env.planning.routing.legs import Legs
+from uas_coverage_env.planning.routing.trips import FreshPacks, Packs, improve_trips
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import Arena, SwarmState
 

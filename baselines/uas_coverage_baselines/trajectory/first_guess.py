@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing.terrain import Terrain
 from uas_coverage_baselines.trajectory.flight_model import POSITION, VELOCITY
 from uas_coverage_baselines.trajectory.program import FlightProgram, PlannedFlight
 from uas_coverage_baselines.trajectory.space import Space
 from uas_coverage_baselines.trajectory.work import Work
+from uas_coverage_env.planning.routing.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -9,9 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import RoutingTask
-from uas_coverage_baselines.routing.terrain import Terrain
-from uas_coverage_baselines.routing.trips import FreshPacks, Packs
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
 from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.program import (
@@ -34,6 +31,9 @@ from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.access import Access
 from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
+from uas_coverage_env.planning.routing import RoutingTask
+from uas_coverage_env.planning.routing.terrain import Terrain
+from uas_coverage_env.planning.routing.trips import FreshPacks, Packs
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState
 

@@ -15,14 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import (
-    Routes,
-    RoutingTask,
-    SearchEffort,
-    empty_routes,
-    improve_routes,
-)
-from uas_coverage_baselines.routing.search import OrderSearch
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import (
     HOPELESS,
@@ -35,6 +27,14 @@ from uas_coverage_baselines.trajectory.mission_plan import (
 )
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import Work
+from uas_coverage_env.planning.routing import (
+    Routes,
+    RoutingTask,
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+)
+from uas_coverage_env.planning.routing.search import OrderSearch
 from uas_coverage_env.world import SwarmState
 
 BoolArray = NDArray[np.bool_]

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import Routes, RoutingTask, SearchEffort, empty_routes
-from uas_coverage_baselines.routing.trips import FreshPacks, improve_trips
 from uas_coverage_baselines.trajectory.closed_off import closed_off
 from uas_coverage_baselines.trajectory.course import (
     Course,
@@ -25,6 +23,8 @@ from uas_coverage_baselines.trajectory.retiming import Draft
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.planning.routing import Routes, RoutingTask, SearchEffort, empty_routes
+from uas_coverage_env.planning.routing.trips import FreshPacks, improve_trips
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]

@@ -13,11 +13,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import Routes, SearchEffort, improve_routes
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_env.mission import MissionBrief, WorldView
 from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.mission.recall import Recall
+from uas_coverage_env.planning.routing import Routes, SearchEffort, improve_routes
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 BoolArray = NDArray[np.bool_]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from uas_coverage_baselines.routing import Routes
 from uas_coverage_baselines.trajectory.course import Course
 from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.routing import Routes
 from uas_coverage_env.world import SwarmState
 
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing import SearchEffort, empty_routes, improve_routes
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_env.mission import Range
+from uas_coverage_env.planning.routing import SearchEffort, empty_routes, improve_routes
 from uas_coverage_env.vehicle.layout import DOD
 
 _AS_LONG_S = 10.0  # a UAS that can wait nearly as long as another may do so, too

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.legs import Legs
 from uas_coverage_env.mission.raised import raised
+from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.world import Arena
 from uas_coverage_env.world.routes import ROUND_CORNER, leg_from_corner, route
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing.terrain import Terrain
-from uas_coverage_env.mission.legs import Legs
+from uas_coverage_env.planning.routing.legs import Legs
+from uas_coverage_env.planning.routing.terrain import Terrain
 from uas_coverage_env.vehicle.layout import VX, VY
 
 FloatArray = NDArray[np.float64]

@@ -26,8 +26,8 @@ from uas_coverage_env.autopilot.belief import (
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.planning.execution.leg_model import Autopilot
-from uas_coverage_env.planning.reserves import ROUTED
 from uas_coverage_env.vehicle.range import (
+    ROUTED,
     SpeedLimits,
     flight_seconds,
     level_seconds,

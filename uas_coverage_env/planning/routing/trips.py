@@ -15,15 +15,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing.search import (
+from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.routing.search import (
     Routes,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
-from uas_coverage_baselines.routing.task import GROUND_S, RoutingTask
-from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.routing.task import GROUND_S, RoutingTask
 from uas_coverage_env.simulation.world import initial_state
 from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.packs import pack_records, swaps_alone

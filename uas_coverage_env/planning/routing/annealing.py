@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing.route_time import (
+from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel
+from uas_coverage_env.planning.routing.route_time import (
     BACKWARD,
     add_piece,
     joined,
@@ -16,8 +17,7 @@ from uas_coverage_baselines.routing.route_time import (
     sum_up,
     sums_of,
 )
-from uas_coverage_baselines.routing.task import FLOWN_BY, GROUND_S, IDLE_COST_S
-from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel
+from uas_coverage_env.planning.routing.task import FLOWN_BY, GROUND_S, IDLE_COST_S
 
 _SAME_TEMPERATURE = 64  # moves
 OVERTIME = 200.0  # cost of a second beyond the budget, in seconds

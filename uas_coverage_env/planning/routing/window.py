@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing.search import Routes
-from uas_coverage_baselines.routing.task import RoutingTask
+from uas_coverage_env.planning.routing.search import Routes
+from uas_coverage_env.planning.routing.task import RoutingTask
 
 
 @dataclass(frozen=True)

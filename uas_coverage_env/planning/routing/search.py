@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.routing.annealing import State, anneal, insert_missing
-from uas_coverage_baselines.routing.route_time import RoutingArrays
-from uas_coverage_baselines.routing.task import FLOWN_BY, RoutingTask
+from uas_coverage_env.planning.routing.annealing import State, anneal, insert_missing
+from uas_coverage_env.planning.routing.route_time import RoutingArrays
+from uas_coverage_env.planning.routing.task import FLOWN_BY, RoutingTask
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 
 from uas_coverage_env.files.strict_toml import parse
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.legs import Legs
+from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.scenario import Scenario
 
 
