@@ -3,7 +3,8 @@
 Each number with the command that gave it. Where that says "chosen by hand", no record of a
 measurement exists; the command then shows what it costs today. Models of flight time that are
 rules of the world stand with them: `vehicle.range.CALIBRATED` and `ROUTED`,
-`autopilot.return_mode.RETURN_MODE`, `scenario.endurance.GENERATED`, `env.observation.home.OBSERVED`.
+`autopilot.return_mode.RETURN_MODE`, `scenario.endurance.GENERATED`,
+`env.observation.home.OBSERVED`.
 """
 
 from typing import NamedTuple
