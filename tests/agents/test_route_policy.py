@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.policy.route_networks import RouteNetworks
-from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.fleet_routes import RouteProblems
+from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.layers import layers_of, value_of
 from uas_coverage_agents.route.leg_flight import (
     AHEAD,
