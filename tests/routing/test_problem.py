@@ -39,8 +39,9 @@ def moment(scenario, **changes):
 
 
 def battery_s(scenario):
-    uas = Legs(MissionBrief.of(scenario)).arena.uas
-    return uas["dod_max"] / uas["dod_per_s"]  # of full batteries
+    brief = MissionBrief.of(scenario)
+    uas, used = Legs(brief).arena.uas, first_sight(brief).x[:, DOD]
+    return (uas["dod_max"] - used) / uas["dod_per_s"]
 
 
 def test_of_a_share_of_the_battery_time_is_kept_for_home_and_for_delays(town):
@@ -50,7 +51,7 @@ def test_of_a_share_of_the_battery_time_is_kept_for_home_and_for_delays(town):
     slower = seen(town, pace=np.array([1.0, 2.0]), late_s=np.array([10.0, 0.0])).uas["budget_s"]
     assert slower == pytest.approx([left_s[0] - 10.0, left_s[1] / 2.0])
     half = moment(town)
-    half.x[:, DOD] = 0.5 * Legs(MissionBrief.of(town)).arena.uas["dod_max"]
+    half.x[:, DOD] += 0.5 * (Legs(MissionBrief.of(town)).arena.uas["dod_max"] - half.x[:, DOD])
     assert seen(town, swarm=half).uas["budget_s"] == pytest.approx(0.4 * whole_s - KEPT_S)
 
 
