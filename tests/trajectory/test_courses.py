@@ -196,7 +196,7 @@ def test_two_courses_that_cross_between_samples_are_seen(pair):
 def test_two_that_are_too_near_now_must_come_no_nearer(pair):
     here = hover(START, 3)
     for step_m, apart in ((0.0, True), (5.0, True), (-0.002, False)):
-        other = straight(np.array(START) + (3.0, 0.0, 0.0), (step_m, 0.0, 0.0), 3, lands=False)
+        other = straight(np.add(START, (3.0, 0.0, 0.0)), (step_m, 0.0, 0.0), 3, lands=False)
         assert are_apart(pair, 0, 1, here, other) == apart
         above = straight(np.array(START) - (0.0, 0.0, 4.0), (0.0, 0.0, -step_m), 3, lands=False)
         assert are_apart(pair, 0, 1, above, here) == apart

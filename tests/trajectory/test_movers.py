@@ -74,7 +74,7 @@ def test_paths_are_apart_as_far_as_their_nearest_moments_between_samples_too():
     above = south - (0.0, 7.0, 0.0)
     assert apart_m(north, above, 0.0, 0.0) == pytest.approx(2.0)
     assert apart_m(north, above, 1.0, 0.5) == pytest.approx(1.5)
-    longer = np.vstack([above + (0.0, 20.0, 0.0), north[1:]])
+    longer = np.vstack([np.add(above, (0.0, 20.0, 0.0)), north[1:]])
     assert apart_m(north, longer, 0.0, 0.0) == pytest.approx(20.0), "beyond its end it is gone"
 
 
@@ -108,9 +108,12 @@ def test_an_obstacle_has_turned_and_a_uas_is_off_where_they_go_otherwise():
     before = replace(moving(((50.0, 60.0, -20.0), (1.0, 0.0, 0.0)), (STANDING,) * 2), n_obstacles=1)
     assert not before.later(3).has_turned(before)
     assert before.later(3).off_m(before, 3.0) == pytest.approx(0.0)
-    turned = replace(before, velocity_mps=before.velocity_mps + [[0.1, 0.0, 0.0], [0.0] * 3])
+    velocities = before.velocity_mps
+    turned = replace(before, velocity_mps=velocities + np.array([(0.1, 0.0, 0.0), STANDING]))
     assert turned.has_turned(before)
-    of_a_uas = replace(before, velocity_mps=before.velocity_mps + [[0.0] * 3, [0.0, 0.4, 0.0]])
+    of_a_uas = replace(
+        before, velocity_mps=np.add(before.velocity_mps, [STANDING, [0.0, 0.4, 0.0]])
+    )
     assert not of_a_uas.has_turned(before)
     assert of_a_uas.later(5).off_m(before, 5.0) == pytest.approx(2.0)
     assert turned.later(5).off_m(before, 5.0) == pytest.approx(0.0)

@@ -1,59 +1,23 @@
 """There is something safe to fly at every decision: each UAS can come home, and all keep apart."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from guarded_fleets import MARGIN_M, PLACES, Charge, Guarded, moved
 from hand_made import NOTHING, course_along, hover, moving, states_along, straight
-from small_fleets import fleet_of
-from small_worlds import box, meadow, mover
+from small_worlds import box
 from uas_coverage_baselines.trajectory.course import are_apart, braked
-from uas_coverage_baselines.trajectory.safeguard import Safeguard
 
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.geometry.segments import segment_clearance
-from uas_coverage_env.mission import Range, WorldView, first_sight
+from uas_coverage_env.mission import Range, first_sight
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.vehicle import lpv_step
 
-PLACES = ((40.0, 60.0, -20.0), (40.0, 100.0, -20.0), (40.0, 140.0, -20.0))
-MARGIN_M = 1.0
 KEEP_M = 0.36 + 3.0 + MARGIN_M  # of a UAS from what stands, but counts as moving
 BRAKING = 14
 SPEED_MPS = 6.0
-
-
-class Charge:
-    """A way home that has charge to spare where it is asked for; it keeps what was asked."""
-
-    def __init__(self, spare=lambda x: 1.0):
-        self.spare, self.asked = spare, []
-
-    def spare_dod(self, uas, x):
-        self.asked.append((uas, x.copy()))
-        return self.spare(x)
-
-
-class Guarded:
-    """A fleet over a meadow, its guard, and what it sees at a step."""
-
-    def __init__(self, n_uas=1, charge=None, **world):
-        self.fleet, self.swarm = fleet_of(meadow(PLACES[:n_uas], **world))
-        brief = self.fleet.brief
-        self.way_home = Charge() if charge is None else charge
-        self.guard = Safeguard(self.fleet, WorldView(brief), self.way_home, MARGIN_M)
-
-    def see(self, step, **states):
-        """What is seen at a step: states of UAS by `x0=`, `x1=`."""
-        x = self.swarm.x.copy()
-        for name, state in states.items():
-            x[int(name[1:])] = state
-        return replace(self.swarm, step=step, x=x)
-
-    def chosen(self, wanted, movers=NOTHING, step=0, staying=(), **states):
-        for u, course in wanted.items():
-            states.setdefault(f"x{u}", course.x[0])
-        return self.guard.chosen(self.see(step, **states), wanted, movers, staying)
 
 
 def northward(u, steps=8, **known):
@@ -222,12 +186,6 @@ def test_what_passes_over_the_place_of_a_landed_uas_does_no_harm():
 # stopping at once
 
 
-def moved(velocity_mps):
-    x = states_along([PLACES[0]])[0]
-    x[S.VX : S.VZ + 1] = velocity_mps
-    return x
-
-
 def reach_m(guarded, x):
     """How far north braking from a state leads."""
     here = replace(hover(PLACES[0], 0), x=x[None])
@@ -324,9 +282,10 @@ def test_a_course_is_not_left_where_braking_would_hit_what_stands(has_wall, foll
     corner_m = north[-1]
     east = corner_m + np.outer(np.arange(1, 9), (0.0, SPEED_MPS, 0.0))
     course = course_along(np.vstack([north, east]))
-    wall = box("wall", corner_m + (6.0, -20.0, -9.0), corner_m + (9.0, 60.0, 20.0))
+    low_m, high_m = (np.add(corner_m, off) for off in ((6.0, -20.0, -9.0), (9.0, 60.0, 20.0)))
+    wall = box("wall", low_m, high_m)
     guarded = Guarded(1, obstacles=(wall,) if has_wall else ())
-    parked = moving((corner_m + (0.0, 12.4, 0.0), (0.0, 0.0, 0.0)))
+    parked = moving((np.add(corner_m, (0.0, 12.4, 0.0)), (0.0, 0.0, 0.0)))
     flown, _ = guarded.chosen({0: course}, parked)[0]
     assert len(flown.u) == followed + BRAKING
     if has_wall:
@@ -339,7 +298,7 @@ def test_a_course_is_not_left_where_braking_would_hit_what_stands(has_wall, foll
 def clearance_m(hull, path_m):
     return min(
         segment_clearance(hull.normals, hull.offsets_m, 0, hull.n_faces, *p, *q)
-        for p, q in zip(path_m[:-1], path_m[1:], strict=True)
+        for p, q in pairwise(path_m)
     )
 
 
@@ -376,7 +335,7 @@ def test_a_course_that_lands_is_not_asked_for_charge_once_more():
 @pytest.mark.parametrize(("dod", "follows"), [(0.3, True), (0.735, False)])
 def test_with_a_battery_that_only_just_lands_no_course_is_braked_on(dod, follows):
     # it flies home in seven steps, and would hover in front of what has come between
-    home_m, start_m = np.array(PLACES[0]), np.array(PLACES[0]) + (42.0, 0.0, 0.0)
+    home_m, start_m = np.array(PLACES[0]), np.add(PLACES[0], (42.0, 0.0, 0.0))
     guarded = Guarded(1)
     guarded = Guarded(1, Range(guarded.fleet.brief))
     course = straight(start_m, (-SPEED_MPS, 0.0, 0.0), 7, dod=dod)
@@ -387,67 +346,6 @@ def test_with_a_battery_that_only_just_lands_no_course_is_braked_on(dod, follows
     flown, as_planned = guarded.chosen({0: course}, between)[0]
     assert as_planned == follows
     assert flown.lands is False
-
-
-# nothing verified: guidance and safety filter
-
-
-def after(guarded, u, inputs, x):
-    out = np.empty_like(x)
-    lpv_step(guarded.fleet.arena.vehicles[u], x, inputs, out)
-    return out
-
-
-def seen_by(guarded, swarm):
-    guarded.guard._world.update(swarm)
-    return guarded.guard
-
-
-def test_a_uas_without_anything_brakes_or_flies_home():
-    guarded = Guarded(2)
-    away = states_along([(90.0, 60.0, -20.0)])[0]
-    moves = moved((5.0, 0.0, 0.0))
-    moves[1] = 140.0
-    guard = seen_by(guarded, guarded.see(3, x0=away, x1=moves))
-    both = guard.evade([0, 1], {}, [0])
-    assert both.keys() == {0, 1}
-    assert guard.evade([1], {}, []).keys() == {1}
-    for u, x in ((0, away), (1, moves)):
-        for _ in range(2):
-            guard = seen_by(guarded, guarded.see(3, x0=x if u == 0 else away, x1=x if u else moves))
-            x = after(guarded, u, guard.evade([u], {}, [0])[u], x)
-        (away, moves) = (x, moves) if u == 0 else (away, x)
-    assert away[S.VX] < -0.5, "home is in the south"
-    assert abs(moves[S.VX]) < 3.0, "it brakes"
-
-
-def test_a_hovering_uas_gets_out_of_the_way_of_what_comes_at_it_late_in_the_mission():
-    coming = mover((40.0, 90.0, -20.0), (0.0, (0.0, -7.0, 0.0)))
-    guarded = Guarded(1, moving_obstacles=(coming,))
-    x = states_along([PLACES[0]])[0]
-    far, near = (
-        replace(
-            guarded.see(50, x0=x),
-            moving_position_m=np.array([[40.0, 60.0 + away_m, -20.0]]),
-            moving_velocity_mps=np.array([[0.0, -7.0, 0.0]]),
-        )
-        for away_m in (130.0, 24.0)
-    )
-    stays, goes = (seen_by(guarded, swarm).evade([0], {}, [])[0] for swarm in (far, near))
-    assert np.abs(stays - goes).max() > 1e-3
-    assert np.abs(stays[S.TAU_X : S.TAU_Z + 1]).max() < 1e-6
-
-
-def test_a_uas_gets_out_of_the_way_of_what_the_others_fly():
-    guarded = Guarded(2)
-    x0, x1 = moved((0.0, 8.0, 0.0)), moved((0.0, -4.0, 0.0))
-    x1[:2] = 44.0, 78.0
-    guard = seen_by(guarded, guarded.see(5, x0=x0, x1=x1))
-    braking = braked(guarded.fleet, 0, replace(hover(PLACES[0], 0), x=x0[None]), 0).u[0]
-    onwards = braking.copy()
-    onwards[S.TAU_X : S.TAU_Z + 1] = 0.0
-    beside, instead = (guard.evade([1], flown, [1])[1] for flown in ({0: onwards}, {}))
-    assert np.abs(beside - instead).max() > 1e-4
 
 
 def test_the_first_sight_of_a_mission_holds_what_a_guard_needs():
