@@ -69,10 +69,14 @@ TRAJECTORY_RESERVE = Reserve(kept_s=6.0)
 hand; `benchmarks/trajectory.py` shows what harm is done."""
 
 ORDER_GUIDE_RESERVE = Reserve(kept_s=25.0)
-"""Of the order that `milp-mpc-guided` follows, somewhat more than `MILP_RESERVE` and `BRAKING_S`
-hold back for braking and landing. Chosen by hand."""
+"""Of the order that `milp-mpc-guided` follows, somewhat more than `MILP_RESERVE` and
+`MILP_BRAKING_S` hold back for braking and landing. Chosen by hand."""
 
-BRAKING_S = 16.0
+BRAKING_S = 14.0
+"""Braking with the inner loop has ended after this time, from any speed [s]. What it is enough for:
+`tests/milp_mpc/test_plan_verification.py`."""
+
+MILP_BRAKING_S = 16.0
 """Of `milp-mpc`: braking to a hover where a plan ends, and turning home [s]. Twice the 8 s of its
 first version, in which braking did not fit; the command is not recorded. What it is enough for:
 `tests/milp_mpc/test_battery_reserve.py`."""
