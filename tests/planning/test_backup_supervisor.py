@@ -160,6 +160,18 @@ def test_courses_that_keep_apart_replace_all_backups_at_once():
     assert supervisor.backups == wanted
 
 
+def test_a_file_of_uas_of_which_each_takes_the_next_one_s_place_moves_at_once():
+    places = [(15.0 * k, 0.0, -20.0) for k in range(4)]
+    supervisor = supervisor_of(4)
+    supervisor.backups = {u: hover(place) for u, place in enumerate(places)}
+    wanted = {u: straight(place, (5.0, 0.0, 0.0), 3) for u, place in enumerate(places)}
+    assert renewed(supervisor, World(), wanted) == {0, 1, 2, 3}
+    # one by one, where a fifth is in the way of the last
+    supervisor = supervisor_of(5)
+    supervisor.backups = {u: hover(place) for u, place in enumerate([*places, (60.0, 0.0, -20.0)])}
+    assert renewed(supervisor, World(), wanted, x4=supervisor.backups[4].x[0]) == set()
+
+
 @pytest.mark.parametrize("pair", [(0, 1), (1, 2), (0, 2)])
 def test_of_two_that_meet_the_first_that_is_asked_for_wins(pair):
     places = HERE, BESIDE, BEYOND
