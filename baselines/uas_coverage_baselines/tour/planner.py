@@ -150,7 +150,7 @@ class Tour:
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
         self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
-        self._schedule = Schedule(brief, self._arena, self._effort)
+        self._schedule = Schedule(brief, self._effort)
         self._brief, self._has_order = brief, not may_go_on
         if self._has_order:
             self._find_order(self._view(first_sight(brief)), seed)

@@ -374,22 +374,22 @@ class Trajectory:
         seed = self._seed + swarm.step
         fresh = self._fleet.fresh_packs(swarm, moment.uncovered, flown)
 
-        def found(barred: BoolArray | None) -> MissionPlan:
-            now = replace(moment, barred=barred)
+        def found(forbidden: BoolArray | None) -> MissionPlan:
+            now = replace(moment, forbidden=forbidden)
             return plan_mission(
                 self._fleet, now, swarm.step, bodies, effort, seed, kept, flown, fresh
             )
 
         # before take-off it costs little to have what is blocked visited by one that can wait
-        barred = None
+        forbidden = None
         if unknown.any() and (first or self._is_handed_over):
-            barred = self._waiting.barred
-        plan = found(barred)
-        if barred is None and self._waiting.is_left_to_others(
+            forbidden = self._waiting.forbidden
+        plan = found(forbidden)
+        if forbidden is None and self._waiting.is_left_to_others(
             plan.planned, swarm.step, swarm.uncovered
         ):
             self._is_handed_over = True
-            plan = found(self._waiting.barred)
+            plan = found(self._waiting.forbidden)
         self.mission_plan, self._planned = plan, dict(plan.planned)
         self.given_up = plan.given_up(self._fleet)
         self._planned_at, self._seen = swarm.step, movers
@@ -420,11 +420,11 @@ class Trajectory:
                 late = unknown[p.route]
                 earliest[p.route[late]] = np.maximum(visits[late], 0)
             bodies = {u: self._fleet.bodies(expected, u) for u in range(len(swarm.x))}
-            barred = self._waiting.barred if unknown.any() else None
+            forbidden = self._waiting.forbidden if unknown.any() else None
             if plan.order.trips:  # which UAS visits what is part of a larger plan
                 others = all_but_own(planned, (len(swarm.x), len(swarm.uncovered)))
-                barred = others if barred is None else barred | others
-            return Ahead(earliest, barred, bodies)
+                forbidden = others if forbidden is None else forbidden | others
+            return Ahead(earliest, forbidden, bodies)
 
         better = self._improvement.better(swarm, plan, self._planned, ahead)
         if better is not None:
