@@ -29,9 +29,9 @@ from uas_coverage_baselines.trajectory.tracking import ProgramOf, tracked
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
 from uas_coverage_env.entities.state import FLYING, LANDED
-from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import MissionBrief, Range, Repeats, WorldView, first_sight
 from uas_coverage_env.mission.handover import Handover, without
+from uas_coverage_env.planning.decision import Decision
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import Command, GoTo, SwarmState, Wrench
 
@@ -139,7 +139,8 @@ class Trajectory:
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
         if (in_wind := self._in_wind.act(swarm)) is not None:
-            commands, self.last_decision = in_wind
+            commands, decision = in_wind
+            self.last_decision = decision and replace(decision, flown_by=("tour",))
             return commands
         if self._repeats is not None:
             if self._has_acted and swarm.step == 0:  # the same mission once more
