@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from added_blocks import Apart
+from added_blocks import Apart, Floor
 from toy_problems import S500, flown, objective_of, planned, state, toy
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP
@@ -80,7 +80,7 @@ def test_the_team_has_the_objective_that_the_whole_program_gives_it():
 
 
 def test_the_team_pays_what_a_block_asks_of_two_at_once():
-    blocks = (*OCP, Apart(60.0))
+    blocks = (*OCP, Apart(60.0), Floor(14.0))
     problem = two()
     plans = [
         plan_of(problem, uas, (0.0, way, 0.0), [], blocks) for uas, way in ((0, 1.0), (1, -1.0))
