@@ -158,78 +158,12 @@ def _below(rng, n, quick):
     return int(rng.random() * n) if quick else rng.integers(0, n)
 
 
-@allocating_kernel
-def _drawn_place(routes, lengths, place, neighbours, w, by_pieces, rng):
-    """(row, place in it) to put waypoint w next to: a near one, sometimes an end of any route."""
-    if neighbours.shape[1] > 0 and rng.random() < 0.95:
-        nearest = min(neighbours.shape[1], 10)
-        v = neighbours[w, _below(rng, nearest, by_pieces)]
-        return place[v, ROW_OF], place[v, PLACE_IN]
-    s = _below(rng, len(lengths), by_pieces)
-    return s, _below(rng, lengths[s] + 1, by_pieces) - 1
-
-
-@allocating_kernel
-def _between(lengths, r, i, s, j, kind, schedule, rng, ours, theirs):
-    """Draw a change of two routes; the numbers of pieces of each, -1 for no change."""
-    last = len(lengths) - 1
-    left_out = r == last or s == last
-    if kind < schedule.relocate or (left_out and schedule.relocate > 0.0):  # relocate a chain
-        chain = 1 if r == last else 1 + _below(rng, 3, schedule.by_pieces)
-        chain = min(chain, lengths[r] - i)
-        backward, after = rng.random() < 0.5, _below(rng, 2, schedule.by_pieces)
-        at = min(max(j + after, 0), lengths[s])
-        n = add_piece(ours, 0, r, 0, i - 1, 0)
-        n = add_piece(ours, n, r, i + chain, lengths[r] - 1, 0)
-        m = add_piece(theirs, 0, s, 0, at - 1, 0)
-        m = add_piece(theirs, m, r, i, i + chain - 1, int(backward))
-        return n, add_piece(theirs, m, s, at, lengths[s] - 1, 0)
-    if left_out or kind >= schedule.exchange:
-        return -1, -1
-    at = min(max(j + 1, 0), lengths[s])  # exchange the tails: w follows v
-    n = add_piece(ours, 0, r, 0, i - 1, 0)
-    n = add_piece(ours, n, s, at, lengths[s] - 1, 0)
-    m = add_piece(theirs, 0, s, 0, at - 1, 0)
-    return n, add_piece(theirs, m, r, i, lengths[r] - 1, 0)
-
-
-@allocating_kernel
-def _within(lengths, r, i, j, kind, schedule, rng, ours):
-    """Draw a change of one route; its number of pieces, -1 for no change."""
-    if kind < schedule.reverse:  # reverse the stretch between
-        low, high = min(i, j) + 1, max(i, j)
-        if rng.random() < 0.5:
-            low, high = max(min(i, j), 0), max(i, j) - 1
-        if high <= low:
-            return -1
-        n = add_piece(ours, 0, r, 0, low - 1, 0)
-        n = add_piece(ours, n, r, low, high, 1)
-        return add_piece(ours, n, r, high + 1, lengths[r] - 1, 0)
-    if kind >= schedule.shift:
-        return -1
-    chain = min(1 + _below(rng, 3, schedule.by_pieces), lengths[r] - i)  # relocate a chain
-    if i <= j < i + chain:
-        return -1
-    backward, after = rng.random() < 0.5, _below(rng, 2, schedule.by_pieces)
-    at = j + after
-    if at < 0:
-        return -1
-    n = add_piece(ours, 0, r, 0, min(at, i) - 1, 0)
-    if at <= i:
-        n = add_piece(ours, n, r, i, i + chain - 1, int(backward))
-        n = add_piece(ours, n, r, at, i - 1, 0)
-    else:
-        n = add_piece(ours, n, r, i + chain, at - 1, 0)
-        n = add_piece(ours, n, r, i, i + chain - 1, int(backward))
-    return add_piece(ours, n, r, max(at, i + chain), lengths[r] - 1, 0)
-
-
-@allocating_kernel
+@inlined_kernel
 def _take(task, routes, lengths, place, sums, r, route, length, by_pieces):
     """Write a route as row r."""
-    routes[r, :length] = route[:length]
     lengths[r] = length
     for k in range(length):
+        routes[r, k] = route[k]
         place[route[k], ROW_OF], place[route[k], PLACE_IN] = r, k
     if by_pieces and r < len(task.uas):
         sum_up(task, sums, r, routes[r], length)
@@ -249,6 +183,7 @@ def anneal(task, now, best, begin, end, schedule, rng):
         rng: source of random numbers.
     """
     routes, lengths, seconds = now.routes, now.lengths, now.seconds
+    neighbours = task.neighbours  # once: taking an array out of a tuple counts a reference
     moves, hottest_s, by_pieces = schedule.moves, schedule.hottest_s, schedule.by_pieces
     cooling = schedule.coldest_s / hottest_s
     n_rows, width = routes.shape
@@ -277,15 +212,67 @@ def anneal(task, now, best, begin, end, schedule, rng):
         if reach == 0:
             continue
         i = _below(rng, reach, by_pieces)
-        s, j = _drawn_place(routes, lengths, place, task.neighbours, routes[r, i], by_pieces, rng)
-        if s < 0:
-            continue
-        kind, n, m = rng.random(), -1, -1
+        w = routes[r, i]
+        # next to what: mostly a near waypoint, sometimes an end of any route
+        if neighbours.shape[1] > 0 and rng.random() < 0.95:
+            nearest = min(neighbours.shape[1], 10)
+            v = neighbours[w, _below(rng, nearest, by_pieces)]
+            s, j = place[v, ROW_OF], place[v, PLACE_IN]
+            if s < 0:
+                continue
+        else:
+            s = _below(rng, n_rows, by_pieces)
+            j = _below(rng, lengths[s] + 1, by_pieces) - 1
+        # written out here: each array handed to a function of its own counts a reference
+        kind, left_out = rng.random(), r == n_uas or s == n_uas
+        n, m = 0, -1
         if s != r:
-            n, m = _between(lengths, r, i, s, j, kind, schedule, rng, ours, theirs)
-        elif r < n_uas:
-            n = _within(lengths, r, i, j, kind, schedule, rng, ours)
-        if n < 0:
+            if kind < schedule.relocate or (left_out and schedule.relocate > 0.0):  # a chain
+                chain = 1 if r == n_uas else 1 + _below(rng, 3, by_pieces)
+                chain = min(chain, lengths[r] - i)
+                backward, after = rng.random() < 0.5, _below(rng, 2, by_pieces)
+                at = min(max(j + after, 0), lengths[s])
+                n = add_piece(ours, 0, r, 0, i - 1, 0)
+                n = add_piece(ours, n, r, i + chain, lengths[r] - 1, 0)
+                m = add_piece(theirs, 0, s, 0, at - 1, 0)
+                m = add_piece(theirs, m, r, i, i + chain - 1, int(backward))
+                m = add_piece(theirs, m, s, at, lengths[s] - 1, 0)
+            elif kind < schedule.exchange and not left_out:  # the tails: w follows v
+                at = min(max(j + 1, 0), lengths[s])
+                n = add_piece(ours, 0, r, 0, i - 1, 0)
+                n = add_piece(ours, n, s, at, lengths[s] - 1, 0)
+                m = add_piece(theirs, 0, s, 0, at - 1, 0)
+                m = add_piece(theirs, m, r, i, lengths[r] - 1, 0)
+            else:
+                continue
+        elif r == n_uas:
+            continue
+        elif kind < schedule.reverse:  # the stretch between
+            low, high = min(i, j) + 1, max(i, j)
+            if rng.random() < 0.5:
+                low, high = max(min(i, j), 0), max(i, j) - 1
+            if high <= low:
+                continue
+            n = add_piece(ours, 0, r, 0, low - 1, 0)
+            n = add_piece(ours, n, r, low, high, 1)
+            n = add_piece(ours, n, r, high + 1, lengths[r] - 1, 0)
+        elif kind < schedule.shift:  # a chain within the route
+            chain = min(1 + _below(rng, 3, by_pieces), lengths[r] - i)
+            if i <= j < i + chain:
+                continue
+            backward, after = rng.random() < 0.5, _below(rng, 2, by_pieces)
+            at = j + after
+            if at < 0:
+                continue
+            n = add_piece(ours, 0, r, 0, min(at, i) - 1, 0)
+            if at <= i:
+                n = add_piece(ours, n, r, i, i + chain - 1, int(backward))
+                n = add_piece(ours, n, r, at, i - 1, 0)
+            else:
+                n = add_piece(ours, n, r, i + chain, at - 1, 0)
+                n = add_piece(ours, n, r, i, i + chain - 1, int(backward))
+            n = add_piece(ours, n, r, max(at, i + chain), lengths[r] - 1, 0)
+        else:
             continue
         quick = by_pieces and r < n_uas and s < n_uas and sums.waits[r] + sums.waits[s] == 0
         n_one, n_two = -1, -1

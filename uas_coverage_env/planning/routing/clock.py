@@ -43,14 +43,14 @@ def turn_cost(table, ax, ay, bx, by):
 
 
 @inlined_kernel
-def setting_off_s(uas, to_m):
+def setting_off_s(uas, dx, dy):
     """What is lost until the velocity of a UAS points to the first waypoint, at its cruising speed.
 
     Args:
         uas: Record of ROUTED_UAS_DTYPE.
-        to_m: (2,) the waypoint, north and east.
+        dx: How far the waypoint is to the north [m].
+        dy: And to the east [m].
     """
-    dx, dy = to_m[0] - uas.position_m[0], to_m[1] - uas.position_m[1]
     length = np.hypot(dx, dy) + 1e-9
     ax = uas.velocity_mps[0] - uas.speed_mps * dx / length
     ay = uas.velocity_mps[1] - uas.speed_mps * dy / length

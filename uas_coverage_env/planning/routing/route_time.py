@@ -59,11 +59,11 @@ def route_s(task, u, route, length):
     uas = task.uas[u]
     if length == 0:
         return uas.idle_s
-    release = task.release[u]
+    place, release = task.place, task.release[u]
     n_waypoints, n_uas = len(release), len(task.uas)
     before, here = n_waypoints + u, route[0]
     time = task.first[u, here]
-    time += setting_off_s(uas, task.place[here])
+    time += setting_off_s(uas, place[here, 0] - place[before, 0], place[here, 1] - place[before, 1])
     time = max(time, release[here])
     for k in range(1, length + 1):
         following = route[k] if k < length else n_waypoints + n_uas + u
@@ -159,7 +159,7 @@ def pieces_s(task, sums, u, routes, pieces, n):
     uas = task.uas[u]
     if n == 0:
         return uas.idle_s
-    kind, n_waypoints, n_uas = uas.kind, task.release.shape[1], len(task.uas)
+    kind, place, n_waypoints, n_uas = uas.kind, task.place, task.release.shape[1], len(task.uas)
     before, here, time = n_waypoints + u, -1, 0.0
     for p in range(n):
         row, low, high = pieces[p, ROW], pieces[p, FIRST], pieces[p, LAST]
@@ -168,7 +168,9 @@ def pieces_s(task, sums, u, routes, pieces, n):
         following = routes[row, at]
         if here < 0:
             time += task.first[u, following]
-            time += setting_off_s(uas, task.place[following])
+            time += setting_off_s(
+                uas, place[following, 0] - place[before, 0], place[following, 1] - place[before, 1]
+            )
         else:
             time += turn_s(task, u, before, here, following)
             time += task.between[kind, here, following]
