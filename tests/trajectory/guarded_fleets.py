@@ -8,6 +8,7 @@ from small_worlds import meadow
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 
 from uas_coverage_env.mission import WorldView
+from uas_coverage_env.planning.backup import braked
 from uas_coverage_env.vehicle.layout import VX, VZ
 
 PLACES = ((40.0, 60.0, -20.0), (40.0, 100.0, -20.0), (40.0, 140.0, -20.0))
@@ -41,10 +42,20 @@ class Guarded:
             x[int(name[1:])] = state
         return replace(self.swarm, step=step, x=x)
 
+    def has(self, backups):
+        """The guard has these backup trajectories and no others."""
+        self.guard.backups.clear()
+        self.guard.backups.update(backups)
+
     def chosen(self, wanted, movers=NOTHING, step=0, staying=(), **states):
         for u, course in wanted.items():
             states.setdefault(f"x{u}", course.x[0])
         return self.guard.chosen(self.see(step, **states), wanted, movers, staying)
+
+
+def braked_for(fleet, course, followed):
+    """A course of the first UAS, followed for some steps and braked then for 14 s."""
+    return braked(fleet.arena.vehicles[0], course, followed, 14)
 
 
 def moved(velocity_mps):

@@ -1,10 +1,10 @@
 """Courses, bodies and inputs made by hand, for the tests of what is flown."""
 
 import numpy as np
-from uas_coverage_baselines.trajectory.course import Course
 from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.program import PlannedFlight
 
+from uas_coverage_env.planning.backup import Course
 from uas_coverage_env.vehicle.layout import DOD, N_STATES, VX, VZ
 
 NOTHING = Movers(*[np.zeros((0, 3))] * 2, *[np.zeros(0)] * 3, 1.0, 0)

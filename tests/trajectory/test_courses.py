@@ -9,12 +9,12 @@ from small_fleets import fleet_of
 from small_worlds import box, meadow
 from uas_coverage_baselines.trajectory.course import (
     are_apart,
-    braked,
     course_of,
     hover_inputs,
     trouble_alone,
 )
 
+from uas_coverage_env.planning.backup import braked
 from uas_coverage_env.vehicle import layout as S
 
 KEEP_M = 2 * 0.36 + 5.0  # of two UAS in the meadow
@@ -135,40 +135,6 @@ def test_a_flight_leaves_a_reserve_in_the_battery(alone, beyond, says):
     assert trouble_alone(fleet, 0, x, flight) == says
 
 
-# a course and what is left of it
-
-
-def test_the_rest_of_a_course_begins_later_and_ends_when_it_ends():
-    course = straight(START, (2.0, 0.0, 0.0), 5, begin=3)
-    rest = course.rest(5)
-    assert (rest.begin, rest.end, rest.lands) == (5, 8, True)
-    np.testing.assert_array_equal(rest.x, course.x[2:])
-    np.testing.assert_array_equal(rest.u, course.u[2:])
-    over = course.rest(11)
-    assert (over.begin, len(over.u), len(over.x)) == (11, 0, 1)
-    np.testing.assert_array_equal(over.x[0], course.x[-1])
-
-
-@pytest.mark.parametrize("state", range(S.N_STATES))
-def test_a_uas_flies_its_course_where_every_state_but_its_batterys_is_as_planned(state):
-    course = straight(START, (2.0, 0.0, 0.0), 5)
-    for off, flies in ((2e-6, state >= S.DOD), (-2e-6, state >= S.DOD), (5e-7, True)):
-        x = course.x[0].copy()
-        x[state] += off
-        assert course.begins_at(x) == flies
-
-
-def test_a_hover_is_held_and_a_uas_that_has_landed_is_gone():
-    for lands in (False, True):
-        course = straight(START, (2.0, 0.0, 0.0), 3, lands=lands)
-        path_m = course.path_m(6)
-        assert len(path_m) == (4 if lands else 7)
-        np.testing.assert_array_equal(path_m[:4], course.x[:, :3])
-        np.testing.assert_array_equal(path_m[4:], np.tile(course.x[-1, :3], (len(path_m) - 4, 1)))
-        assert len(course.path_m(2)) == 3
-        assert len(course.path_m(3)) == 4
-
-
 # two courses
 
 
@@ -209,24 +175,12 @@ def test_a_short_hover_is_in_the_way_of_a_long_course_and_a_landed_uas_is_not(pa
     assert are_apart(pair, 0, 1, hover(START, 1, lands=True), passing)
 
 
-# braking
-
-
-@pytest.mark.parametrize(("dt_s", "steps"), [(1.0, 14), (0.8, 18)])
-def test_a_course_is_followed_for_some_steps_and_then_braked_to_a_hover(dt_s, steps):
-    fleet, _ = fleet_of(meadow((START,), dt_s=dt_s))
-    course = straight(START, (6.0, 0.0, 0.0), 9, begin=4)
-    for followed in (0, 1, 5, 9):
-        trial = braked(fleet, 0, course, followed)
-        assert (trial.begin, trial.lands, len(trial.u)) == (4, False, followed + steps)
-        np.testing.assert_array_equal(trial.x[: followed + 1], course.x[: followed + 1])
-        np.testing.assert_array_equal(trial.u[:followed], course.u[:followed])
-        assert np.linalg.norm(trial.x[-1, S.VX : S.VZ + 1]) < 0.05
-        assert (trial.x[-1, 0] > course.x[followed, 0] + 3.0) == (followed > 0)
+# a hover
 
 
 def test_what_holds_a_hover_is_the_first_of_braking(pair):
     x = at(START, (5.0, -2.0, 1.0))
     here = course_along([START])
     here.x[0] = x
-    np.testing.assert_array_equal(hover_inputs(pair, 0, x), braked(pair, 0, here, 0).u[0])
+    stop = braked(pair.arena.vehicles[0], here, 0, 14)
+    np.testing.assert_array_equal(hover_inputs(pair, 0, x), stop.u[0])

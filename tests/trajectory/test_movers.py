@@ -8,8 +8,9 @@ from hand_made import moving
 from small_fleets import fleet_of
 from small_worlds import box, meadow, mover
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
-from uas_coverage_baselines.trajectory.space import apart_m, spare_of_rules_m
+from uas_coverage_baselines.trajectory.space import spare_of_rules_m
 
+from uas_coverage_env.planning.backup import apart_m
 from uas_coverage_env.vehicle.layout import VX, VZ
 
 UAS_M, MARGIN_M = 0.36, 1.0

@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from guarded_fleets import PLACES, Guarded, moved
+from guarded_fleets import PLACES, Guarded, braked_for, moved
 from hand_made import hover, states_along
 from small_worlds import mover
-from uas_coverage_baselines.trajectory.course import braked
 
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle import lpv_step
@@ -63,7 +62,7 @@ def test_a_uas_gets_out_of_the_way_of_what_the_others_fly():
     x0, x1 = moved((0.0, 8.0, 0.0)), moved((0.0, -4.0, 0.0))
     x1[:2] = 44.0, 78.0
     guard = seen_by(guarded, guarded.see(5, x0=x0, x1=x1))
-    braking = braked(guarded.fleet, 0, replace(hover(PLACES[0], 0), x=x0[None]), 0).u[0]
+    braking = braked_for(guarded.fleet, replace(hover(PLACES[0], 0), x=x0[None]), 0).u[0]
     onwards = braking.copy()
     onwards[S.TAU_X : S.TAU_Z + 1] = 0.0
     beside, instead = (guard.evade([1], flown, [1])[1] for flown in ({0: onwards}, {}))

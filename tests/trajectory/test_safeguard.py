@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from guarded_fleets import MARGIN_M, PLACES, Charge, Guarded, moved
+from guarded_fleets import MARGIN_M, PLACES, Charge, Guarded, braked_for, moved
 from hand_made import NOTHING, course_along, hover, moving, states_along, straight
 from small_worlds import box
-from uas_coverage_baselines.trajectory.course import are_apart, braked
+from uas_coverage_baselines.trajectory.course import are_apart
 
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.geometry.segments import segment_clearance
@@ -60,10 +60,10 @@ def test_where_two_of_three_courses_meet_the_third_is_flown():
 
 def test_a_uas_whose_course_is_in_the_way_goes_on_with_what_it_has():
     guarded = Guarded(2)
-    guarded.guard.backups = {1: hover(PLACES[1], 20)}
+    guarded.has({1: hover(PLACES[1], 20)})
     chosen = guarded.chosen({0: northward(0), 1: westward(1)})
     assert chosen[1][1]  # clear of the other, which is gone by then
-    guarded.guard.backups = {1: hover(PLACES[1], 20)}
+    guarded.has({1: hover(PLACES[1], 20)})
     held = guarded.guard.backups[1]
     chosen = guarded.chosen({0: eastward(0, 5), 1: westward(1)})
     assert chosen[0][1]
@@ -73,21 +73,21 @@ def test_a_uas_whose_course_is_in_the_way_goes_on_with_what_it_has():
 
 def test_a_course_is_not_flown_through_the_backup_of_another():
     guarded = Guarded(2)
-    guarded.guard.backups = {1: hover(PLACES[1], 20)}
+    guarded.has({1: hover(PLACES[1], 20)})
     chosen = guarded.chosen({0: eastward(0)}, x1=states_along([PLACES[1]])[0])
     assert {u: as_planned for u, (_, as_planned) in chosen.items()} == {1: False}
 
 
 def test_a_course_that_waits_for_another_to_leave_is_flown_in_the_same_decision():
     guarded = Guarded(2)
-    guarded.guard.backups = {1: hover(PLACES[1], 40)}
+    guarded.has({1: hover(PLACES[1], 40)})
     # through the place of the second, which sets off in time
     wanted = {0: eastward(0), 1: northward(1, 12)}
     assert are_apart(guarded.fleet, 0, 1, wanted[0], wanted[1])
     assert guarded.chosen(wanted) == {u: (course, True) for u, course in wanted.items()}
     # and where a third is in the way, of which nothing else can be flown
     guarded = Guarded(3)
-    guarded.guard.backups = {1: hover(PLACES[1], 40), 2: hover(PLACES[2], 40)}
+    guarded.has({1: hover(PLACES[1], 40), 2: hover(PLACES[2], 40)})
     wanted = {0: eastward(0, 20), 1: northward(1, 12)}
     still = states_along([PLACES[2]])[0]
     assert {u for u, (_, new) in guarded.chosen(wanted, x2=still).items() if new} == {1}
@@ -95,7 +95,7 @@ def test_a_course_that_waits_for_another_to_leave_is_flown_in_the_same_decision(
 
 def test_a_course_taken_second_keeps_clear_of_those_taken_first():
     guarded = Guarded(3)
-    guarded.guard.backups = {u: hover(PLACES[u], 40) for u in range(3)}
+    guarded.has({u: hover(PLACES[u], 40) for u in range(3)})
     wanted = {0: eastward(0), 1: northward(1), 2: westward(2)}
     chosen = guarded.chosen(wanted)
     flown = [course for course, _ in chosen.values()]
@@ -132,7 +132,7 @@ def test_a_uas_that_lands_where_it_is_is_in_the_way_for_one_step_only():
 def test_after_a_step_what_is_left_of_the_backup_is_flown():
     guarded = Guarded(1)
     course = northward(0)
-    guarded.guard.backups = {0: course}
+    guarded.has({0: course})
     for step in (1, 2, 5):
         (flown, as_planned) = guarded.chosen({}, step=step, x0=course.x[step])[0]
         assert not as_planned
@@ -144,7 +144,7 @@ def test_after_a_step_what_is_left_of_the_backup_is_flown():
 def test_a_backup_that_begins_elsewhere_is_not_flown():
     guarded = Guarded(1)
     course = northward(0)
-    guarded.guard.backups = {0: course}
+    guarded.has({0: course})
     elsewhere = course.x[1].copy()
     elsewhere[1] += 0.01
     (flown, _) = guarded.chosen({}, step=1, x0=elsewhere)[0]
@@ -156,28 +156,28 @@ def test_a_backup_that_begins_elsewhere_is_not_flown():
 def test_a_backup_that_something_has_come_to_cross_is_not_flown():
     guarded = Guarded(1)
     course = northward(0, 12)
-    guarded.guard.backups = {0: course}
+    guarded.has({0: course})
     far, near = (moving(((100.0, 60.0 + off_m, -20.0), (0.0, 0.0, 0.0))) for off_m in (9.0, 7.0))
     assert guarded.chosen({}, far, 1, x0=course.x[1])[0][0].u.shape[0] == 11
-    guarded.guard.backups = {0: course}
+    guarded.has({0: course})
     stop, _ = guarded.chosen({}, near, 1, x0=course.x[1])[0]
-    np.testing.assert_array_equal(stop.x, braked(guarded.fleet, 0, course.rest(1), 0).x)
+    np.testing.assert_array_equal(stop.x, braked_for(guarded.fleet, course.rest(1), 0).x)
 
 
 def test_a_hover_at_the_end_of_a_backup_holds_until_something_comes():
     guarded = Guarded(1)
     over = hover(PLACES[0], 1).rest(5)
-    guarded.guard.backups = {0: over}
+    guarded.has({0: over})
     assert len(guarded.chosen({}, step=9, x0=over.x[0])[0][0].u) == 0
     coming = moving(((40.0, 75.0, -20.0), (0.0, -9.0, 0.0)))
-    guarded.guard.backups = {0: over}
+    guarded.has({0: over})
     assert not guarded.chosen({}, coming, step=9, x0=over.x[0])
 
 
 def test_what_passes_over_the_place_of_a_landed_uas_does_no_harm():
     guarded = Guarded(1)
     landed = hover(PLACES[0], 2, lands=True).rest(2)
-    guarded.guard.backups = {0: landed}
+    guarded.has({0: landed})
     beside = moving(((40.0, 66.0, -20.0), (0.0, -9.0, 0.0)))
     chosen = guarded.chosen({}, beside, step=2, x0=landed.x[0])
     assert chosen[0][0].lands
@@ -189,7 +189,7 @@ def test_what_passes_over_the_place_of_a_landed_uas_does_no_harm():
 def reach_m(guarded, x):
     """How far north braking from a state leads."""
     here = replace(hover(PLACES[0], 0), x=x[None])
-    return float(braked(guarded.fleet, 0, here, 0).x[:, 0].max())
+    return float(braked_for(guarded.fleet, here, 0).x[:, 0].max())
 
 
 @pytest.mark.parametrize(("gap_m", "stops"), [(-0.05, False), (0.05, True)])
@@ -230,7 +230,7 @@ def stops_m(guarded, course):
     """(N,) the farthest north that following a course for 1..N steps and braking leads."""
     n = len(course.u)
     return np.array(
-        [braked(guarded.fleet, 0, course, k).x[:, 0].max() for k in range(1, n + 1)], float
+        [braked_for(guarded.fleet, course, k).x[:, 0].max() for k in range(1, n + 1)], float
     )
 
 
@@ -253,7 +253,7 @@ def test_of_a_course_that_meets_something_the_longest_part_is_followed_that_is_c
     followed = int(np.flatnonzero(clear).max()) + 1
     assert as_planned
     assert 1 < followed < 16
-    expected = braked(guarded.fleet, 0, course, followed)
+    expected = braked_for(guarded.fleet, course, followed)
     np.testing.assert_array_equal(flown.x, expected.x)
     assert not flown.lands
 
@@ -290,7 +290,7 @@ def test_a_course_is_not_left_where_braking_would_hit_what_stands(has_wall, foll
     assert len(flown.u) == followed + BRAKING
     if has_wall:
         hull = guarded.fleet.brief.hulls[0]
-        beyond = braked(guarded.fleet, 0, course, followed + 1)
+        beyond = braked_for(guarded.fleet, course, followed + 1)
         for trial, keeps in ((flown, True), (beyond, False)):
             assert (clearance_m(hull, trial.x[:, :3]) >= 2.36) == keeps
 
@@ -342,7 +342,7 @@ def test_with_a_battery_that_only_just_lands_no_course_is_braked_on(dod, follows
     assert np.linalg.norm(course.x[-1, :3] - home_m) < 1e-9
     between = parked_at(home_m[0] - 4.0)
     held = hover(start_m, 5, dod=dod)
-    guarded.guard.backups = {0: held}
+    guarded.has({0: held})
     flown, as_planned = guarded.chosen({0: course}, between)[0]
     assert as_planned == follows
     assert flown.lands is False

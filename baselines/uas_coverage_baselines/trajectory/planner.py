@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs.mission import LegMission
-from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
+from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement, all_but_own
 from uas_coverage_baselines.trajectory.in_wind import InWind, blows
@@ -32,6 +32,7 @@ from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.mission import MissionBrief, Range, Repeats, WorldView, first_sight
 from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.planning.decision import Decision
+from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import Command, GoTo, SwarmState, Wrench
 
