@@ -25,7 +25,7 @@ from uas_coverage_env.vehicle.layout import Z
 
 PLANNERS = ("nearest-waypoint", "lawnmower", "tour", "milp-mpc", "milp-mpc-guided")
 OPTIONS = {
-    name: {"deterministic": True, "horizon": 12, "threads": 1}
+    name: {"horizon": 12, "threads": 1}
     for name in ("milp-mpc", "milp-mpc-guided")
 }
 HEAD = (
