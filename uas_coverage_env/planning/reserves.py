@@ -44,8 +44,7 @@ class Reserve(NamedTuple):
 
 TOUR = Reserve(kept_s=30.0, spare_s=10.0, landing_s=3.0)
 """Of `tour`: what return mode asks for beyond the way home at full speed; and a landing from full
-speed over the start to rest on it. Chosen by hand; `benchmarks/tour.py` sets the times of its
-orders beside those that are flown."""
+speed over the start to rest on it. Chosen by hand."""
 
 TOUR_SCARCE = Reserve(kept_s=20.0, spare_s=3.0, landing_s=3.0)
 """Of `tour` once charge does not suffice for all. With it and other changes of 0.3.0 it covered
