@@ -101,7 +101,7 @@ def test_the_room_of_a_path_is_what_it_keeps_from_what_moves_on_as_it_moves_now(
     if hit is None:
         assert found_m == pytest.approx(room_m, abs=1e-6)
     else:
-        assert -1e6 <= found_m == pytest.approx(-1e6 + hit * dt_s, abs=1e-6)
+        assert found_m == pytest.approx(-1e6 + hit * dt_s, rel=0.0, abs=1e-6)
 
 
 def path_along(velocity_mps, n_steps=4):
@@ -126,6 +126,20 @@ def test_what_comes_is_met_where_it_will_be_at_the_end_of_a_step(axis):
         assert flees_m == pytest.approx(ENOUGH_M)
         meets_m = room_from_movers(world.arena, 0, 0, path_along(sign * 1.0 * towards, 3))
         assert meets_m == pytest.approx(20.0 - 2.0 - 5.36 - 15.0 + LINGERING * (-2.36) / 3)
+
+
+def test_a_path_that_ends_in_a_contact_is_worth_the_less_the_sooner_it_does():
+    comes = mover((130.0, 100.0, -25.0), (0.0, (-4.0, 0.0, 0.0)), radius_m=2.0, height_m=4.0)
+    for dt_s, flown_mps, hit in ((1.0, 0.0, 6), (1.0, 2.0, 4), (0.5, 0.0, 13), (0.5, 2.0, 9)):
+        world, _ = watched([(100.0, 100.0, -25.0)], [comes], dt_s=dt_s)
+        path_m = path_along(dt_s * flown_mps * np.eye(3)[0], 18)
+        found_m = room_from_movers(world.arena, 0, 0, path_m)
+        assert found_m == pytest.approx(-1e6 + hit * dt_s, rel=0.0, abs=1e-6)
+        # the radius of the UAS decides what a contact is
+        for gap_m, is_hit in ((RADIUS_M - 1e-6, True), (RADIUS_M + 1e-6, False)):
+            aside_m = path_along(np.zeros(3), 18)
+            aside_m[:, 1] += 2.0 + gap_m
+            assert (room_from_movers(world.arena, 0, 0, aside_m) < -1e5) == is_hit
 
 
 def rooms_of(world, committed_m, heading_rad):

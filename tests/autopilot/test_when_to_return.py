@@ -22,6 +22,7 @@ from uas_coverage_env.vehicle.layout import DOD, VX, VY
 from uas_coverage_env.vehicle.range import margin_to_land, seconds_to_land
 from uas_coverage_env.world.overhangs import widest_overhang_m
 from uas_coverage_env.world.places import may_be_at
+from uas_coverage_env.world.routes import ROUND_CORNER, leg_from_corner, route
 
 HOME_M = (30.0, 40.0, -1.0)
 WORK = (waypoint((190.0, 190.0, -40.0), 5.0),)
@@ -114,17 +115,46 @@ def test_walls_on_the_way_home_are_passed_over_from_the_first_to_the_last(across
     assert margin_s == pytest.approx(margin_to_land(expected_s, True))
 
 
-def test_a_way_round_a_tall_building_counts_the_walls_of_all_its_legs():
-    tall = box("tall", (80.0, 60.0, -49.5), (90.0, 140.0, 0.0))
-    low = box("low", (40.0, 0.5, -10.0), (44.0, 199.5, 0.0))
-    times_s = []
-    for obstacles in ([tall], [tall, low], []):
-        world = World(meadow([(20.0, 100.0, -1.0)], obstacles=obstacles, waypoints=WORK))
-        assert world.arena.obstacles["tall"].any() == bool(obstacles)
-        world.state.x[0, :3] = 150.0, 100.0, -3.0
-        times_s.append(sum(flight_home(world.arena, 0, world.state.x[0])))
-    assert times_s[0] > times_s[2] + 5.0
-    assert times_s[1] > times_s[0] + 0.5
+def corners_of_way(world):
+    """(K, 2) places [m] between which the straight legs of the way home lie."""
+    arena, here_m = world.arena, world.state.x[0, :3]
+    home_m = np.array(world.scenario.uas[0].start_m)
+    row = len(world.scenario.waypoints)
+    *end_m, _, leg = route(arena, row, *here_m, *home_m)
+    corners_m = [here_m[:2].copy(), np.array(end_m)]
+    while leg == ROUND_CORNER:
+        *end_m, leg = leg_from_corner(arena, row, *corners_m[-1], here_m[2], *home_m)
+        corners_m.append(np.array(end_m))
+    return np.array(corners_m)
+
+
+@pytest.mark.parametrize("low_m", [(36.0, 40.0), (120.0, 124.0)], ids=["last", "first"])
+@pytest.mark.parametrize("across", [False, True])
+def test_on_a_way_round_a_tall_building_the_wall_of_any_leg_is_passed_over(low_m, across):
+    def turned(point):
+        return (point[1], point[0], point[2]) if across else point
+
+    tall = box("tall", turned((75.0, 60.0, -49.5)), turned((95.0, 140.0, 0.0)))
+    low = box("low", turned((low_m[0], 0.5, -10.0)), turned((low_m[1], 199.5, 0.0)))
+    world = World(meadow([turned((20.0, 95.0, -1.0))], obstacles=[tall, low], waypoints=WORK))
+    assert world.arena.obstacles["tall"].tolist() == [True, False]
+    world.state.x[0, :3] = turned((150.0, 95.0, -3.0))
+    corners_m = corners_of_way(world)
+    assert len(corners_m) == 4
+    lengths_m = np.linalg.norm(np.diff(corners_m, axis=0), axis=1)
+    flown_m, north_m = np.append(0.0, np.cumsum(lengths_m)), corners_m[:, int(across)]
+    wall_m, roof_m = (float(world.arena.obstacles[name][1]) for name in ("wall_m", "roof_m"))
+    before_m, until_m = (
+        float(np.interp(-edge_m, -north_m, flown_m))
+        for edge_m in (low_m[1] + wall_m, low_m[0] - wall_m)
+    )
+    expected_s = seconds_to_land(
+        world.arena.vehicles[0], flown_m[-1], 0.0, 2.0, roof_m + 0.5 - 1.0, before_m,
+        flown_m[-1] - until_m,
+    )  # fmt: skip
+    seconds, margin_s = flight_home(world.arena, 0, world.state.x[0])
+    assert seconds == pytest.approx(expected_s)
+    assert margin_s == pytest.approx(margin_to_land(expected_s, True))
 
 
 @pytest.mark.parametrize("wind_mps", [(4.0, 0.0), (0.0, -5.0), (-3.0, 3.0), (3.6, 4.8)])
@@ -174,24 +204,26 @@ def test_from_below_a_slab_and_to_below_one_it_takes_longer(here_m, home_m, low,
     assert seconds - without_s == pytest.approx(15.0 + across_m / 0.6 + climb_m / climb_mps)
 
 
-@pytest.mark.parametrize("velocity_mps", [(0.0, 0.0), (8.0, -6.0)])
-@pytest.mark.parametrize("wind_mps", [(0.0, 0.0), (3.0, -2.0)])
+@pytest.mark.parametrize(
+    ("velocity_mps", "wind_mps", "dt_s"),
+    [((0.0, 0.0), (0.0, 0.0), 0.5), ((8.0, -6.0), (3.0, -2.0), 1.0), ((8.0, 6.0), (0.0, 0.0), 1.0)],
+)
 def test_a_step_later_the_way_home_is_that_from_the_farthest_place_that_may_be_reached(
-    velocity_mps, wind_mps
+    velocity_mps, wind_mps, dt_s
 ):
     wall = box("wall", (95.0, 60.0, -49.5), (98.0, 160.0, 0.0))
     world = world_at(
         (104.0, 100.0, -3.0), velocity_mps, level="light", wind_mps=wind_mps, obstacles=[wall],
-        dt_s=1.0,
+        dt_s=dt_s,
     )  # fmt: skip
     arena, x, belief = parts(world)
     vehicle = arena.vehicles[0]
     most_mps2 = vehicle.gravity_mps2 * math.tan(vehicle.tilt_max_rad)
     stops_s = 1.5 * math.hypot(*velocity_mps) / most_mps2
     longest_s = 1.5 * vehicle.v_xy_max_mps / most_mps2
-    middle_m = x[:2] + (1.0 + 0.6 * stops_s) * np.array(velocity_mps)
-    around_m = most_mps2 * (1.0 + 0.6 * longest_s)
-    down_m = min(-3.0 + vehicle.v_down_max_mps, -arena.rules[0]["floor_m"])
+    middle_m = x[:2] + (dt_s + 0.6 * stops_s) * np.array(velocity_mps)
+    around_m = most_mps2 * dt_s * (dt_s + 0.6 * longest_s)
+    down_m = min(-3.0 + dt_s * vehicle.v_down_max_mps, -arena.rules[0]["floor_m"])
     turns = np.arange(8) * np.pi / 4
     ring_m = around_m * np.column_stack([np.cos(turns), np.sin(turns)])
     places_m = [middle_m, *(middle_m + ring_m), *(middle_m + 2.0 * ring_m)]
@@ -204,7 +236,7 @@ def test_a_step_later_the_way_home_is_that_from_the_farthest_place_that_may_be_r
         else:
             refused += 1
     assert refused > 0 < len(latest_s)
-    expected_s = 1.0 + stops_s + max(latest_s)
+    expected_s = dt_s + stops_s + max(latest_s)
     assert latest_flight_home(arena, 0, x, belief) == pytest.approx(expected_s)
 
 
