@@ -170,7 +170,9 @@ class TeamSearch:
         program = self._own[uas]
         path, visit = flight.positions_m[None], flight.visit[None]
         bounds = program.bounds_near(path, visit, neighbourhood)
-        limits = SolverLimits(nodes=self._nodes(_NODES), relative_gap=0.01, absolute_gap=0.05, heuristics=False)
+        limits = SolverLimits(
+            nodes=self._nodes(_NODES), relative_gap=0.01, absolute_gap=0.05, heuristics=False
+        )
         return self._solved(program, limits, program.start(path, visit), bounds)
 
     def _collect(self, uas: int, solution: Solution | None) -> None:
