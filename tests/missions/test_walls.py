@@ -25,7 +25,6 @@ from uas_coverage_env.vehicle.layout import DOD
 
 WALLS = Path(__file__).parent / "walls"
 CHEAP = {
-    "deterministic": "true",
     "at_once": "1",
     "horizon": "10",
     "time_limit_s": "0.25",
