@@ -23,11 +23,8 @@ from uas_coverage_env import Flight, Scenario, generate_scenario, load_planner, 
 from uas_coverage_env.flight.metrics import accomplished, energy_Wh
 from uas_coverage_env.vehicle.layout import Z
 
-PLANNERS = ("nearest-waypoint", "lawnmower", "tour", "milp-mpc", "milp-mpc-guided")
-OPTIONS = {
-    name: {"horizon": 12, "threads": 1}
-    for name in ("milp-mpc", "milp-mpc-guided")
-}
+PLANNERS = ("nearest-waypoint", "lawnmower", "tour", "milp-mpc")
+OPTIONS = {"milp-mpc": {"horizon": 12, "threads": 1}}
 HEAD = (
     *("planner", "accomplished", "low without it, %", "low with it, %"),
     *("steps without it", "steps, %", "energy, %", "fallbacks"),

@@ -42,7 +42,7 @@ from uas_coverage_env.runner.jobs import Job
 from uas_coverage_env.runner.workers import Workers
 from uas_coverage_env.scenario import sample_scenario
 
-PLANNERS = "milp-mpc,milp-mpc-guided,lawnmower,nearest-waypoint"
+PLANNERS = "milp-mpc,lawnmower,nearest-waypoint"
 SEEDS = "1000:1020"
 CLEAN, TOUCHED, BAD_INPUT, STOPPED = 0, 1, 2, 130
 _TABLE_WIDTH = 190

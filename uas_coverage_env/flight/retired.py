@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 
 FOLLOWERS: Mapping[str, str] = {
-    "learned-waypoint": "learned-route, or a policy of your own on `action=\"waypoint\"` "
+    "milp-mpc-guided": "milp-mpc with --option order=search, or trajectory",
+    "learned-waypoint": 'learned-route, or a policy of your own on `action="waypoint"` '
     "(`uas-coverage train maskable-ppo`)",
 }
 """A planner of an earlier version -> what to fly now, as it ends `fly ...`."""

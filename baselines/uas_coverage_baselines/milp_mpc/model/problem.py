@@ -65,7 +65,7 @@ class Target:
 
 @dataclass(frozen=True)
 class TourSegment:
-    """What a UAS is to visit next, in this order, before it goes on (`milp-mpc-guided`).
+    """What a UAS is to visit next, in this order, before it goes on (`order=search`).
 
     Attributes:
         waypoints: (K,) positions in `PlanningProblem.waypoints_m`.
