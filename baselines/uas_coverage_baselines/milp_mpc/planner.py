@@ -10,6 +10,7 @@ from pydantic import Field
 from uas_coverage_baselines.milp_mpc.along_order import AlongOrder
 from uas_coverage_baselines.milp_mpc.mode_problems import ModeProblems
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
+from uas_coverage_baselines.milp_mpc.model.own_data import with_data
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.milp_mpc.options import ModeOptions, MovingHorizonOptions
@@ -54,6 +55,7 @@ class MilpMpc(MovingHorizon[MilpMpcOptions]):
             seed: of that search.
         """
         super().reset(brief, seed)
+        self._brief = brief
         self._problems: ModeProblems | AlongOrder
         if self.options.order == "search":
             self._problems = AlongOrder(brief, self.options, seed)
@@ -79,4 +81,5 @@ class MilpMpc(MovingHorizon[MilpMpcOptions]):
 
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """Algorithms 2 and 3 or the order, then the OCP's data."""
-        return self._problems.problem(swarm, self.plan)
+        problem = self._problems.problem(swarm, self.plan)
+        return with_data(problem, self.blocks, self._brief, swarm)
