@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from toy_problems import S500, box, flight, flown, planned, state, toy
+from toy_problems import S500, box, flight, flown, objective_of, planned, state, toy
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
@@ -65,22 +65,6 @@ def best(problem):
     solution = solve(formulate(problem)[0].build(), OPTIMAL)
     assert solution.status is SolveStatus.OPTIMAL
     return solution
-
-
-def objective_of(problem, plan):
-    """The objective of a plan's states, inputs and coverage, by the whole OCP; inf if refused."""
-    milp, v = formulate(problem)
-    built = milp.build()
-    lower, upper = built.lower.copy(), built.upper.copy()
-    covers = plan.covers[:, :, problem.waypoint_index].astype(float)
-    for columns, values, room in (
-        (v.x[:, 1:], plan.x[:, 1:], 1e-7),
-        (v.u, plan.u, 1e-7),
-        (v.covers[v.covers >= 0], covers[v.covers >= 0], 0.0),
-    ):
-        lower[columns], upper[columns] = values - room, values + room
-    assert not covers[v.covers < 0].any()
-    return solve(built, OPTIMAL, lower=lower, upper=upper).objective
 
 
 def test_a_team_of_plans_is_a_point_of_the_whole_program_with_the_objective_it_says(
