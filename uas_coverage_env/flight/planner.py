@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
 from uas_coverage_env.files.strict_toml import InputError, StrictModel
@@ -23,23 +21,6 @@ class Assistants:
 
     return_mode: bool | None = None
     safety_filter: bool | None = None
-
-
-@dataclass(frozen=True)
-class Decision:
-    """What a planner may tell about its last decision.
-
-    Attributes:
-        predicted_m: Name of a UAS -> (N+1, 3) [m] positions, n = 0 is now.
-        fallback: Whether the decision was flown on a fallback.
-        mip_gap: Relative to what the plan can influence; None where there is none.
-        reason: Why there was a fallback, in a few words; None where the planner does not say.
-    """
-
-    predicted_m: Mapping[str, NDArray[np.float64]]
-    fallback: bool = False
-    mip_gap: float | None = None
-    reason: str | None = None
 
 
 class Planner(Protocol):

@@ -18,12 +18,12 @@ from uas_coverage_baselines.tour.schedule import Schedule, View
 from uas_coverage_env.entities.commands import COMMAND_DTYPE
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import AssistedOptions
-from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import MissionBrief, Repeats, WorldView, first_sight
 from uas_coverage_env.mission.guided_flight import GuidedFlight
 from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.learnt_wind import LearntWind, in_disturbances
 from uas_coverage_env.mission.recall import Recall
+from uas_coverage_env.planning.decision import Decision
 from uas_coverage_env.planning.routing import Routes, SearchEffort
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import Arena, Command, GoTo, SwarmState, Velocity
@@ -150,7 +150,7 @@ class Tour:
         self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
         self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
-        self._schedule = Schedule(brief, self._arena, self._effort)
+        self._schedule = Schedule(brief, self._effort)
         self._brief, self._has_order = brief, not may_go_on
         if self._has_order:
             self._find_order(self._view(first_sight(brief)), seed)

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory.lead import Lead
-from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.decision import Decision
 from uas_coverage_env.planning.routing import SearchEffort
 from uas_coverage_env.world import Arena, Command, SwarmState
 

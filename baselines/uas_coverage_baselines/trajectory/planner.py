@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.by_legs.mission import LegMission
-from uas_coverage_baselines.trajectory.course import BRAKING_S, Course, hover_inputs
+from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_baselines.trajectory.improving import Ahead, Improvement, all_but_own
 from uas_coverage_baselines.trajectory.in_wind import InWind, blows
@@ -29,9 +29,10 @@ from uas_coverage_baselines.trajectory.tracking import ProgramOf, tracked
 from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 from uas_coverage_baselines.trajectory.waiting import choose_waiting, opens_again, opens_first
 from uas_coverage_env.entities.state import FLYING, LANDED
-from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.mission import MissionBrief, Range, Repeats, WorldView, first_sight
 from uas_coverage_env.mission.handover import Handover, without
+from uas_coverage_env.planning.decision import Decision
+from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import Command, GoTo, SwarmState, Wrench
 
@@ -139,7 +140,8 @@ class Trajectory:
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly on as planned, and plan anew where that is not possible or no longer right."""
         if (in_wind := self._in_wind.act(swarm)) is not None:
-            commands, self.last_decision = in_wind
+            commands, decision = in_wind
+            self.last_decision = decision and replace(decision, flown_by=("tour",))
             return commands
         if self._repeats is not None:
             if self._has_acted and swarm.step == 0:  # the same mission once more
@@ -374,22 +376,22 @@ class Trajectory:
         seed = self._seed + swarm.step
         fresh = self._fleet.fresh_packs(swarm, moment.uncovered, flown)
 
-        def found(barred: BoolArray | None) -> MissionPlan:
-            now = replace(moment, barred=barred)
+        def found(forbidden: BoolArray | None) -> MissionPlan:
+            now = replace(moment, forbidden=forbidden)
             return plan_mission(
                 self._fleet, now, swarm.step, bodies, effort, seed, kept, flown, fresh
             )
 
         # before take-off it costs little to have what is blocked visited by one that can wait
-        barred = None
+        forbidden = None
         if unknown.any() and (first or self._is_handed_over):
-            barred = self._waiting.barred
-        plan = found(barred)
-        if barred is None and self._waiting.is_left_to_others(
+            forbidden = self._waiting.forbidden
+        plan = found(forbidden)
+        if forbidden is None and self._waiting.is_left_to_others(
             plan.planned, swarm.step, swarm.uncovered
         ):
             self._is_handed_over = True
-            plan = found(self._waiting.barred)
+            plan = found(self._waiting.forbidden)
         self.mission_plan, self._planned = plan, dict(plan.planned)
         self.given_up = plan.given_up(self._fleet)
         self._planned_at, self._seen = swarm.step, movers
@@ -420,11 +422,11 @@ class Trajectory:
                 late = unknown[p.route]
                 earliest[p.route[late]] = np.maximum(visits[late], 0)
             bodies = {u: self._fleet.bodies(expected, u) for u in range(len(swarm.x))}
-            barred = self._waiting.barred if unknown.any() else None
+            forbidden = self._waiting.forbidden if unknown.any() else None
             if plan.order.trips:  # which UAS visits what is part of a larger plan
                 others = all_but_own(planned, (len(swarm.x), len(swarm.uncovered)))
-                barred = others if barred is None else barred | others
-            return Ahead(earliest, barred, bodies)
+                forbidden = others if forbidden is None else forbidden | others
+            return Ahead(earliest, forbidden, bodies)
 
         better = self._improvement.better(swarm, plan, self._planned, ahead)
         if better is not None:

@@ -115,10 +115,10 @@ class Steering:
 
     def _search(self, swarm: SwarmState, works: BoolArray, wanted: BoolArray) -> None:
         moment = Moment(swarm.x, works, wanted, np.zeros(len(wanted), np.int64), swarm.time_s)
-        task = self._fleet.task(moment, np.zeros(len(works)))
-        kept = improve_routes(task, self._order, SearchEffort(0), 0)
+        problem = self._fleet.problem(moment)
+        kept = improve_routes(problem, self._order, SearchEffort(0), 0)
         if swarm.step % self._again == 0 or not np.array_equal(works, self._worked):
-            better = improve_routes(task, kept, self._effort, self._seed + swarm.step)
+            better = improve_routes(problem, kept, self._effort, self._seed + swarm.step)
             if better.cost_s < kept.cost_s - _WORTH_CHANGING_S:
                 kept = better
         self._order, self._worked = kept, works
