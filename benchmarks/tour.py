@@ -31,12 +31,14 @@ from rich.console import Console
 from rich.table import Table
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.tour.schedule import Schedule, View
+from uas_coverage_baselines.tour.tour_flight import TourFlight
 
 from uas_coverage_env import MissionBrief, Scenario, load_scenario
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import rollout
 from uas_coverage_env.flight.metrics import energy_Wh
 from uas_coverage_env.leaderboard import seed_range
+from uas_coverage_env.mission import first_sight
 from uas_coverage_env.planning.routing import (
     Routes,
     RoutingTask,
@@ -149,8 +151,11 @@ class _Ordered(Tour):
         super().__init__()
         self._given = order
 
-    def _find_order(self, view: View, seed: int) -> None:
-        self._schedule.take(self._given, view)
+    def reset(self, brief: MissionBrief, seed: int) -> None:
+        super().reset(brief, seed)
+        assert isinstance(self.flight, TourFlight)
+        view = self.flight._view(first_sight(brief))
+        self.flight.schedule.take(self._given, view)
 
 
 def main(

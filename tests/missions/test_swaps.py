@@ -129,7 +129,7 @@ def test_before_take_off_each_waypoint_is_for_now_or_for_a_fresh_pack(
 ):
     made = planner(planner.Options(moves=20_000))
     made.reset(MissionBrief.of(with_charge(large_mission, charge)), 0)
-    order = made.mission_plan.order if planner is Trajectory else made._schedule.order
+    order = made.mission_plan.order if planner is Trajectory else made.flight.schedule.order
     visits = np.concatenate([*order.routes, order.later])
     assert sorted(visits.tolist()) == list(range(len(large_mission.waypoints)))
     assert len(order.later)

@@ -21,6 +21,7 @@ from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions, weight
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
+from uas_coverage_baselines.trajectory.mission_plan import order_effort
 from uas_coverage_env.entities.commands import HOME, Mode
 from uas_coverage_env.mission import MissionBrief, Ways, first_sight
 from uas_coverage_env.planning.routing import Routes
@@ -103,7 +104,8 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
             whole["conditions"] = brief.conditions.model_copy(update={"mean_mps": 0.0})
         planner.reset(brief.model_copy(update=whole), seed)
         assert planner.mission_plan is not None
-        return planner.mission_plan.order, planner.total_weight
+        effort = order_effort(planner.options, len(brief.uas))
+        return planner.mission_plan.order, effort.total_weight
 
     def mode(self, name: str) -> Mode:
         """Covering while a UAS has anything left to visit."""
