@@ -38,6 +38,7 @@ from uas_coverage_env.scenario import Scenario, load_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.layout import Z
 from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
+from uas_coverage_env.world.packs import swaps_alone
 
 _RECORDED_PACKAGES = (
     "uas-coverage-env", "numpy", "scipy", "numba", "highspy", "pyscipopt", "gurobipy",
@@ -91,7 +92,8 @@ def rollout(
         seed: The seed of the planner and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
         return_mode: Let the world bring UAS home in time; None: as the planner asks, and unless it
-            refuses, where something pushes back (wind, wrong models, sensors, events).
+            refuses, where something pushes back (wind, wrong models, sensors, events), or UAS swap
+            packs while the others fly on and the planner does not plan so far ahead (`is_idle`).
         safety_filter: Let the world keep commands clear of harm; None: likewise.
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
         disturbances: What pushes back; None: what the scenario says. Others than those of the
@@ -116,7 +118,9 @@ def rollout(
     assistants: Assistants = getattr(planner, "assistants", Assistants())
     # no plan is verified against what pushes back, nor one of legs against what moves
     by_legs = scenario.execution is not None
-    uncertain = _is_uncertain(scenario, disturbances)
+    # whoever looks no farther than the next waypoint is called home for a fresh pack
+    called = swaps_alone(scenario) and not hasattr(planner, "is_idle")
+    uncertain = _is_uncertain(scenario, disturbances) or called
     if return_mode is None:
         return_mode = assistants.return_mode
         # return mode would fly home another way than the file

@@ -37,7 +37,8 @@ class Planner(Protocol):
     - `routes`: (U,) the waypoints of each UAS, in order, at the last `reset` or `act`; along these
       an autopilot flies (`[execution]`). None: it has none.
     - `is_idle(swarm)`: whether a UAS flies that has nothing more to visit; a planner that has it is
-      shown before the time which waypoints are asked for again (`SwarmState.again_s`).
+      shown before the time which waypoints are asked for again (`SwarmState.again_s`), and brings
+      UAS home for fresh packs by itself (`[sorties]` with `together = false`).
     - `goes_to`: whether it sends UAS by `GoTo`: the world's guidance is then compiled before the
       first decision, otherwise when such a command first comes; neither counts as time of it.
     - `is_learner`: whether its wrenches are judged as those of learners in environments, see
