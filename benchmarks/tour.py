@@ -41,14 +41,13 @@ from uas_coverage_env.leaderboard import seed_range
 from uas_coverage_env.mission import first_sight
 from uas_coverage_env.planning.routing import (
     Routes,
-    RoutingTask,
+    RoutingProblem,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.world import build_arena
 
 _MOVES_AT_ONCE = 250_000
 _PER_SECOND = 10  # OR-tools counts in whole numbers
@@ -56,7 +55,7 @@ _SUM_TO_LONGEST = (2, 5)  # 0.4 of the sum for once the longest, as in `SearchEf
 _LEFT_OUT_S = 120  # for a waypoint of weight 1, as in our search
 
 
-def problem(scenario: Scenario) -> RoutingTask:
+def problem(scenario: Scenario) -> RoutingProblem:
     """The routing problem before take-off, nothing blocked."""
     swarm = World(scenario).swarm_state()
     all_uas = np.ones(len(swarm.names), np.bool_)
@@ -68,10 +67,10 @@ def problem(scenario: Scenario) -> RoutingTask:
         blocked=np.zeros_like(swarm.uncovered),
         time_s=0.0,
     )
-    return Schedule(MissionBrief.of(scenario), build_arena(scenario), SearchEffort(0)).task(view)
+    return Schedule(MissionBrief.of(scenario), SearchEffort(0)).problem(view)
 
 
-def annealed(task: RoutingTask, seconds: float) -> Routes:
+def annealed(task: RoutingProblem, seconds: float) -> Routes:
     """Our search: as many anneals as the time allows, the best of them."""
     moves, best, until = _MOVES_AT_ONCE, empty_routes(task.n_uas), time.perf_counter() + seconds
     seed = 0
@@ -88,7 +87,7 @@ def annealed(task: RoutingTask, seconds: float) -> Routes:
     return best
 
 
-def judged(task: RoutingTask, routes: Sequence[NDArray[np.int64]]) -> Routes:
+def judged(task: RoutingProblem, routes: Sequence[NDArray[np.int64]]) -> Routes:
     """Routes as an order, with what our search says that they take and cost.
 
     Open waypoints on no route are left out, at the cost that leaving them out has in the search.
@@ -98,7 +97,7 @@ def judged(task: RoutingTask, routes: Sequence[NDArray[np.int64]]) -> Routes:
     return improve_routes(task, order, SearchEffort(0), 0)
 
 
-def routed(task: RoutingTask, seconds: float) -> Routes:
+def routed(task: RoutingProblem, seconds: float) -> Routes:
     """OR-tools: one vehicle per UAS, from where it is, to its start."""
     from ortools.constraint_solver import pywrapcp, routing_enums_pb2
 
@@ -109,15 +108,15 @@ def routed(task: RoutingTask, seconds: float) -> Routes:
     evaluators = []
     for u in range(U):
         arcs = np.zeros((W + 2 * U, W + 2 * U))
-        arcs[:W, :W] = task.between_s[task.kind[u]]
+        arcs[:W, :W] = task.between_s[task.uas["kind"][u]]
         arcs[W + u, :W] = task.first_s[u]
         arcs[:W, W + U + u] = task.home_s[u]
-        arcs[W + u, W + U + u] = task.idle_s[u]
+        arcs[W + u, W + U + u] = task.uas["idle_s"][u]
         whole = np.rint(_PER_SECOND * arcs).astype(int)
         evaluators.append(routing.RegisterTransitMatrix(whole.tolist()))
         weighted = routing.RegisterTransitMatrix((_SUM_TO_LONGEST[0] * whole).tolist())
         routing.SetArcCostEvaluatorOfVehicle(weighted, u)
-    budget = np.maximum(_PER_SECOND * task.budget_s, 0.0).astype(int).tolist()
+    budget = np.maximum(_PER_SECOND * task.uas["budget_s"], 0.0).astype(int).tolist()
     routing.AddDimensionWithVehicleTransitAndCapacity(evaluators, 0, budget, True, "time")
     routing.GetDimensionOrDie("time").SetGlobalSpanCostCoefficient(_SUM_TO_LONGEST[1])
     parameters = pywrapcp.DefaultRoutingSearchParameters()

@@ -48,7 +48,7 @@ def view_of(scenario, **changes):
 
 
 def schedule_of(scenario, view, moves=20_000):
-    schedule = Schedule(MissionBrief.of(scenario), build_arena(scenario), SearchEffort(moves))
+    schedule = Schedule(MissionBrief.of(scenario), SearchEffort(moves))
     schedule.begin(view, 0)
     return schedule
 

@@ -11,8 +11,14 @@ from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import first_sight
 from uas_coverage_env.planning.following import Following, SearchedOrder, Seen
-from uas_coverage_env.planning.following.searched_order import SearchedAgain, first_order
-from uas_coverage_env.planning.routing import RoutingTask, SearchEffort
+from uas_coverage_env.planning.following.searched_order import SearchedAgain
+from uas_coverage_env.planning.reserves import TOUR
+from uas_coverage_env.planning.routing import (
+    RoutingProblem,
+    SearchEffort,
+    empty_routes,
+    search_orders,
+)
 from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import GoTo
@@ -42,10 +48,14 @@ class Tasks:
 
     def __call__(self, seen, visited):
         self.asked += 1
-        return RoutingTask.of(
-            self.legs, seen.swarm.x, seen.works, open_waypoints=visited,
-            weight=np.ones(len(visited)), budget_s=np.full(2, 900.0), landing_s=4.0,
-        )  # fmt: skip
+        swarm = dataclasses.replace(seen.swarm, uncovered=visited)
+        return RoutingProblem.seen(BRIEF, swarm, self.legs, seen.works, TOUR)
+
+
+def first_order(problem, effort, searches, seed):
+    """The cheapest of some searches that begin with nothing."""
+    tried = [(effort, seed + k) for k in range(searches)]
+    return search_orders(problem, empty_routes(problem.n_uas), tried)[0]
 
 
 class AlongOrder:

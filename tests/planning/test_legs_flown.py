@@ -11,6 +11,7 @@ from uas_coverage_env.planning.execution.lateness import Timed, pairs_of
 from uas_coverage_env.planning.execution.leg_course import CoursePlanner
 from uas_coverage_env.planning.execution.leg_follower import LegFollower
 from uas_coverage_env.planning.execution.leg_model import Autopilot
+from uas_coverage_env.planning.routing.clock import CUTTING
 from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.scenario import Execution, Scenario
 from uas_coverage_env.world import Velocity
@@ -74,7 +75,7 @@ def test_corners_cost_what_the_leg_model_loses_in_them_and_straight_on_costs_not
     assert legs.turn_s[0].tolist() == [by.turn_s] * 3
     assert by.turn_s > Autopilot.of(scenario.vehicles[0], 8.0).turn_s > 0.0
     assert legs.turn_of_cosine[[128, 256]].tolist() == [1.0, 0.0]
-    assert Legs(MissionBrief.of(scenario)).turn_of_cosine is None
+    assert Legs(MissionBrief.of(scenario)).turn_of_cosine is CUTTING
 
 
 CROSSING = [waypoint((150.0, 140.0, -20.0), 6.0), waypoint((150.0, 60.0, -20.0), 6.0)]

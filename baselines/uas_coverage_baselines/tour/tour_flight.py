@@ -113,7 +113,7 @@ class TourFlight:
         self._returns = np.zeros(n_uas, np.bool_)
         self._uncovered = self._later = np.zeros(n_waypoints, np.bool_)
         self._radius_m = self._arena.waypoints["radius_m"].copy()
-        self.schedule = Schedule(brief, self._arena, effort)
+        self.schedule = Schedule(brief, effort)
         self.decision: Decision | None = None
         self._flown, self._has_order = flown, not goes_on
         if self._has_order:

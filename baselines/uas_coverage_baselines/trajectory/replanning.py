@@ -100,18 +100,18 @@ class Replanning:
         bodies = {u: fleet.bodies(moving, u) for u in range(len(swarm.x))}
         fresh = fleet.fresh_packs(swarm, moment.uncovered, flown)
 
-        def found(barred: BoolArray | None) -> MissionPlan:
-            now = replace(moment, barred=barred)
+        def found(forbidden: BoolArray | None) -> MissionPlan:
+            now = replace(moment, forbidden=forbidden)
             return plan_mission(
                 fleet, now, step, bodies, effort, self._seed + step, kept, flown, fresh
             )
 
         # before take-off it costs little to have what is blocked visited by one that can wait
-        barred = waiting.barred if unknown.any() and (first or self.is_handed_over) else None
-        plan = found(barred)
-        if barred is None and waiting.is_left_to_others(plan.planned, step, swarm.uncovered):
+        forbidden = waiting.forbidden if unknown.any() and (first or self.is_handed_over) else None
+        plan = found(forbidden)
+        if forbidden is None and waiting.is_left_to_others(plan.planned, step, swarm.uncovered):
             self.is_handed_over = True
-            plan = found(waiting.barred)
+            plan = found(waiting.forbidden)
         may_fly = flying.copy()
         if first:
             may_fly = np.isin(np.arange(len(flying)), [*plan.planned, *plan.troubles])
@@ -162,11 +162,11 @@ class Replanning:
             late = unknown[p.route]
             earliest[p.route[late]] = np.maximum(visits[late], 0)
         bodies = {u: fleet.bodies(expected, u) for u in range(len(swarm.x))}
-        barred = in_force.waiting.barred if unknown.any() else None
+        forbidden = in_force.waiting.forbidden if unknown.any() else None
         if in_force.plan.order.trips:  # which UAS visits what is part of a larger plan
             others = all_but_own(planned, (len(swarm.x), len(swarm.uncovered)))
-            barred = others if barred is None else barred | others
-        return Ahead(earliest, barred, bodies)
+            forbidden = others if forbidden is None else forbidden | others
+        return Ahead(earliest, forbidden, bodies)
 
     def _earliest(self, swarm: SwarmState, opens: IntArray, later: int) -> IntArray:
         """(W,) steps, from a sample so much later, before which waypoints are not to be visited."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 from uas_coverage_env.planning.following import Following, SearchedOrder, Seen
 from uas_coverage_env.planning.following.searched_order import SearchedAgain
-from uas_coverage_env.planning.routing import Routes, RoutingTask, SearchEffort
+from uas_coverage_env.planning.routing import Routes, RoutingProblem, SearchEffort
 
 _AGAIN_S = 10.0  # so often the order is searched anew: flights take as long as they take
 
@@ -68,12 +68,12 @@ def along_order(
         seed: Of later searches.
     """
 
-    def task(seen: Seen, visited: NDArray[np.bool_]) -> RoutingTask:
+    def problem(seen: Seen, visited: NDArray[np.bool_]) -> RoutingProblem:
         any_time = np.zeros(len(visited), np.int64)
         moment = Moment(seen.swarm.x, seen.works, visited, any_time, seen.swarm.time_s)
-        return fleet.task(moment, np.zeros(len(seen.works)))
+        return fleet.problem(moment)
 
     effort = SearchEffort(moves, hottest_s=1.5, total_weight=total_weight)
     every = max(round(_AGAIN_S / fleet.brief.dt_s), 1)
     again = SearchedAgain(effort, every, seed)
-    return Following(fleet.brief, SearchedOrder(task, order, again))
+    return Following(fleet.brief, SearchedOrder(problem, order, again))

@@ -16,12 +16,15 @@ from uas_coverage_env.planning.following.following import Seen, first_of
 from uas_coverage_env.planning.following.searched_order import (
     SearchedAgain,
     SearchedOrder,
-    first_order,
 )
-from uas_coverage_env.planning.reserves import BY_LEGS, BY_LEGS_RESERVE
-from uas_coverage_env.planning.routing import RoutingTask, SearchEffort
+from uas_coverage_env.planning.reserves import BY_LEGS
+from uas_coverage_env.planning.routing import (
+    RoutingProblem,
+    SearchEffort,
+    empty_routes,
+    search_orders,
+)
 from uas_coverage_env.planning.routing.terrain import Terrain
-from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 BoolArray = NDArray[np.bool_]
@@ -42,11 +45,12 @@ class LegOrder:
 
     def __init__(self, brief: MissionBrief, searches: int, effort: SearchEffort, seed: int) -> None:
         self._brief, self._terrain = brief, Terrain(brief)
-        self._weight = np.array([w.weight for w in brief.waypoints], float)
         begin = self._seen(first_sight(brief))
-        order = first_order(self._task(begin, begin.wanted), effort, searches, seed)
+        problem = self._problem(begin, begin.wanted)
+        tried = [(effort, seed + attempt) for attempt in range(searches)]
+        order = search_orders(problem, empty_routes(problem.n_uas), tried)[0]
         again = SearchedAgain(effort, every_steps=0, seed=seed)
-        self._order = SearchedOrder(self._task, order, again)
+        self._order = SearchedOrder(self._problem, order, again)
         self.decision: Decision | None = None
 
     @property
@@ -75,21 +79,6 @@ class LegOrder:
         wanted = open_now(swarm).uncovered
         return Seen(swarm, works, wanted, np.zeros_like(wanted))
 
-    def _task(self, seen: Seen, visited: BoolArray) -> RoutingTask:
-        brief, x, works = self._brief, seen.swarm.x, seen.works
-        uas = self._terrain.arena.uas
-        share = 1.0 if brief.conditions is None else brief.conditions.charge_share
-        left_s = share * (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]
-        ends_s = brief.max_steps * brief.dt_s - seen.swarm.time_s
-        if works.any():
-            visited = visited & brief.can_cover[works].any(axis=0)
-        task = RoutingTask.of(
-            self._terrain,
-            x,
-            works,
-            open_waypoints=visited,
-            weight=self._weight,
-            budget_s=np.minimum(left_s, ends_s) - BY_LEGS_RESERVE.kept_s,
-            landing_s=BY_LEGS.landing_s,
-        )
-        return replace(task, turn_of_cosine=self._terrain.legs.turn_of_cosine)  # it stops there
+    def _problem(self, seen: Seen, visited: BoolArray) -> RoutingProblem:
+        swarm = replace(seen.swarm, uncovered=visited)
+        return RoutingProblem.seen(self._brief, swarm, self._terrain, seen.works, BY_LEGS)

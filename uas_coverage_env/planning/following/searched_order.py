@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from uas_coverage_env.planning.following.following import Seen
 from uas_coverage_env.planning.routing import (
     Routes,
-    RoutingTask,
+    RoutingProblem,
     SearchEffort,
-    empty_routes,
     improve_routes,
 )
 
@@ -47,15 +46,18 @@ class SearchedOrder:
     nothing else is left.
 
     Args:
-        task_of: The routing problem of what is seen, and of the waypoints (W,) to visit.
+        problem_of: The routing problem of what is seen, and of the waypoints (W,) to visit.
         order: From which to go on.
         again: How.
     """
 
     def __init__(
-        self, task_of: Callable[[Seen, BoolArray], RoutingTask], order: Routes, again: SearchedAgain
+        self,
+        problem_of: Callable[[Seen, BoolArray], RoutingProblem],
+        order: Routes,
+        again: SearchedAgain,
     ) -> None:
-        self._task_of, self.order, self._again = task_of, order, again
+        self._problem_of, self.order, self._again = problem_of, order, again
         self._worked: BoolArray | None = None
         self._made_at = -1
 
@@ -88,16 +90,8 @@ class SearchedOrder:
         return bool(visited.any()) and (happened or (every > 0 and since >= every))
 
     def _search(self, seen: Seen, visited: BoolArray) -> None:
-        task, again = self._task_of(seen, visited), self._again
-        kept = improve_routes(task, self.order, replace(again.effort, moves=0), 0)
-        better = improve_routes(task, kept, again.effort, again.seed + seen.swarm.step)
+        problem, again = self._problem_of(seen, visited), self._again
+        kept = improve_routes(problem, self.order, replace(again.effort, moves=0), 0)
+        better = improve_routes(problem, kept, again.effort, again.seed + seen.swarm.step)
         self.order = better if better.cost_s < kept.cost_s - _WORTH_CHANGING_S else kept
         self._made_at = seen.swarm.step
-
-
-def first_order(task: RoutingTask, effort: SearchEffort, searches: int, seed: int) -> Routes:
-    """The cheapest of some searches that begin with nothing."""
-    orders = [
-        improve_routes(task, empty_routes(task.n_uas), effort, seed + k) for k in range(searches)
-    ]
-    return min(orders, key=lambda order: order.cost_s)
