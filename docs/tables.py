@@ -48,6 +48,7 @@ from uas_coverage_env.env.rewards.terms import rewards_table
 from uas_coverage_env.flight import Why, figures
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.leaderboard.scores import columns
+from uas_coverage_env.planning.reserves import RESERVES, Reserve
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
 
@@ -216,6 +217,16 @@ def of_operations(name: str) -> str:
     return table(*getattr(importlib.import_module("operations_tables"), name)())
 
 
+def reserves() -> str:
+    """What routes allow for, and keep of the flying time."""
+    numbers = [name for name in Reserve._fields if name not in ("of", "measured")]
+    rows = [
+        (f"`{name}`", *(f"{getattr(one, column):g}" for column in numbers), one.of, one.measured)
+        for name, one in RESERVES.items()
+    ]
+    return table(("reserve", *(f"`{name}`" for name in numbers), "of", "measured by"), rows)
+
+
 PARTS: dict[str, Callable[[], str]] = {
     "batch_arrays": batch_arrays,
     "environments": environments,
@@ -237,6 +248,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "families": families_table,
     "planners": planners,
     "figures": flight_figures,
+    "reserves": reserves,
     "comparison_columns": comparison_columns,
     "not_on_a_gpu": lambda: table(
         ("does not run on a GPU", "instead"), [(row.what, row.instead) for row in REFUSED]
