@@ -19,13 +19,15 @@ from torch import nn
 
 from uas_coverage_agents.policy import PolicyDescription, save_policy
 from uas_coverage_agents.policy.description import ScenarioFamily, Towns, Training
-from uas_coverage_agents.route.clock import DONE, IN_THE_AIR, Mission
+from uas_coverage_agents.route.fleet_routes import RouteProblems
 from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.layout import route_networks
 from uas_coverage_agents.route.leg_flight import N_FLIGHT
-from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import (
+    DONE,
+    IN_THE_AIR,
     N_ORDER,
+    WEIGHT,
     K,
     RouteWorkspace,
     move,
@@ -46,6 +48,8 @@ from uas_coverage_agents.training.route_labels import (
     town_of,
 )
 from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.planning.routing.route_time import RoutingArrays
+from uas_coverage_env.planning.routing.search import arrays_of
 
 HIDDEN = 32
 ORDER_EPOCHS, ORDER_BATCH, ORDER_RATE = 60, 256, 2e-3
@@ -71,24 +75,24 @@ def _tensors(name: str, network: nn.Sequential) -> dict[str, NDArray[np.float64]
 
 
 def _choices(
-    mission: Mission, routes: list[list[int]], room: RouteWorkspace
+    task: RoutingArrays, unit_s: float, routes: list[list[int]], room: RouteWorkspace
 ) -> list[tuple[NDArray, NDArray, int]]:
     """What is read, may be chosen and was chosen, when labelled routes are built again."""
-    n_uas, n_waypoints = mission.from_s.shape
+    n_uas, n_waypoints = task.first.shape
     ready_s, place = np.zeros(n_uas), np.full(n_uas, IN_THE_AIR)
-    before_m, open_ = mission.here_m.copy(), np.ones(n_waypoints, np.bool_)
+    before, open_ = n_waypoints + np.arange(n_uas), np.ones(n_waypoints, np.bool_)
     left = [list(route) for route in routes]
     found = []
     while open_.any():
         u = next_free(place, ready_s)
         if u == -1 or place[u] == DONE:
             break
-        observe_choices(mission, u, ready_s, place, before_m, open_, room)
+        observe_choices(task, unit_s, u, ready_s, place, before, open_, room)
         w = left[u].pop(0) if left[u] else -1
         where = np.flatnonzero(room.candidates == w) if w >= 0 else np.array([K])
         if len(where) and room.legal[where[0]] and room.legal.sum() > 1:
             found.append((room.rows.astype(np.float32), room.legal.copy(), int(where[0])))
-        move(mission, u, w, ready_s, place, before_m, open_)
+        move(task, u, w, ready_s, place, before, open_)
     return found
 
 
@@ -98,9 +102,9 @@ def choices_of(labels: list[Label]) -> tuple[torch.Tensor, torch.Tensor, torch.T
     for label in labels:
         brief = MissionBrief.of(town_of(label.seed))
         swarm = first_sight(brief)
-        late = np.zeros(len(brief.waypoints), np.bool_)
-        mission = MissionMaker(brief).mission(swarm, np.ones(len(brief.uas), np.bool_), late)
-        found += _choices(mission, label.routes, room)
+        problems, works = RouteProblems(brief), np.ones(len(brief.uas), np.bool_)
+        task = arrays_of(problems.seen(swarm, works, swarm.uncovered), WEIGHT)
+        found += _choices(task, problems.unit_s, label.routes, room)
     rows, legal, choice = zip(*found, strict=True)
     return (
         torch.tensor(np.array(rows)),
