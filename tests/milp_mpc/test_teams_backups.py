@@ -154,6 +154,25 @@ def test_one_that_is_late_whatever_it_does_holds_up_no_other():
     assert [followed(plan, out, k) for k in range(2)] == [HORIZON] * 2
 
 
+@pytest.mark.parametrize(("spare_s", "is_late"), [(0.5, False), (-0.5, True)])
+def test_a_uas_is_late_from_the_moment_on_at_which_it_would_have_had_to_turn_back(spare_s, is_late):
+    problem, plan = far_from_home(spare_s)
+    out = backup_trajectory(problem, plan, 1.0)
+    assert (out is not None and followed(plan, out, 1) == HORIZON) == is_late
+
+
+def test_a_wall_before_one_uas_does_not_shorten_what_another_follows():
+    starts = [state((60.0, 60.0 + 60.0 * k, -10.0), (6.0, 0.0, 0.0)) for k in range(2)]
+    plan = plan_of(*[flown(S500, x0, NORTH) for x0 in starts])
+    wall_m = float(plan.x[1, -1, 0]) + 3.0
+    wall = box((wall_m, 90.0, -49.0), (wall_m + 20.0, 150.0, 0.0))
+    problem = toy(*starts, horizon=HORIZON, obstacles=[wall])
+    assert first_trouble(problem, plan) is None
+    out = backup_trajectory(problem, plan, 1.0)
+    assert followed(plan, out, 0) == HORIZON
+    assert 0 < followed(plan, out, 1) < HORIZON
+
+
 def test_a_team_waits_for_the_end_of_the_longest_and_keeps_what_it_covers_until_it_brakes():
     plan = dataclasses.replace(crossing(), covers=np.zeros((2, HORIZON, 3), bool))
     plan.covers[1, 1, 0] = plan.covers[1, HORIZON - 1, 1] = plan.covers[0, HORIZON - 1, 2] = True
@@ -163,6 +182,23 @@ def test_a_team_waits_for_the_end_of_the_longest_and_keeps_what_it_covers_until_
     assert n[1] < n[0] == HORIZON
     assert out.u.shape[1] == HORIZON + BRAKING
     assert np.argwhere(out.covers).tolist() == [[0, HORIZON - 1, 2], [1, 1, 0]]
+
+
+def test_what_moves_is_predicted_for_as_long_as_the_longest_backup_takes():
+    plan = plan_of(flown(S500, state((60.0, 60.0, -10.0), (6.0, 0.0, 0.0)), NORTH))
+    late_m = plan.x[0, -1, :3] + (9.0, 0.0, 0.0)  # where the first will hover
+    path_m = late_m + np.outer(np.arange(HORIZON + 1) - 20, (0.0, 6.0, 0.0))
+    problem = toy(
+        *plan.x[:, 0],
+        horizon=HORIZON,
+        moving_obstacles=[moving(path_m, 2.0, 2.0)],
+        moving_clearance_m=3.0,
+    )
+    assert first_trouble(problem, plan) is None
+    out = backup_trajectory(problem, plan, 1.0)
+    assert followed(plan, out, 0) < HORIZON
+    level_m = out.x[0, 20:22, :2] - late_m[:2]
+    assert np.hypot(*level_m.T).min() > 5.0
 
 
 # what is left still holds

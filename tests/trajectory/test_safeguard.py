@@ -204,6 +204,13 @@ def test_a_uas_with_nothing_to_fly_brakes_where_that_is_clear_of_what_stands(gap
 
 
 @pytest.mark.parametrize(("gap_m", "stops"), [(-0.05, False), (0.05, True)])
+def test_a_uas_with_nothing_to_fly_brakes_where_it_stays_within_the_fence_s_margin(gap_m, stops):
+    guarded, x = Guarded(1), moved((8.0, 0.0, 0.0))
+    x[0] += 200.0 - 0.5 - gap_m - reach_m(guarded, x)
+    assert (0 in guarded.chosen({}, x0=x)) == stops
+
+
+@pytest.mark.parametrize(("gap_m", "stops"), [(-0.05, False), (0.05, True)])
 def test_a_uas_with_nothing_to_fly_brakes_where_that_is_clear_of_what_moves(gap_m, stops):
     guarded, x = Guarded(1), moved((8.0, 0.0, 0.0))
     parked_m = reach_m(guarded, x) + 4.0 + KEEP_M + gap_m
