@@ -9,6 +9,7 @@ from guarded_fleets import MARGIN_M, PLACES, Charge, Guarded, braked_for, moved
 from hand_made import NOTHING, course_along, hover, moving, states_along, straight
 from small_worlds import box
 from uas_coverage_baselines.trajectory.course import are_apart
+from uas_coverage_baselines.trajectory.safeguard import Seen
 
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.geometry.segments import segment_clearance
@@ -181,6 +182,31 @@ def test_what_passes_over_the_place_of_a_landed_uas_does_no_harm():
     beside = moving(((40.0, 66.0, -20.0), (0.0, -9.0, 0.0)))
     chosen = guarded.chosen({}, beside, step=2, x0=landed.x[0])
     assert chosen[0][0].lands
+
+
+class Spared:
+    """What moves, which leaves a path so much to spare."""
+
+    def __init__(self, spare):
+        self.spare = spare
+
+    def spare_m(self, path_m, radius_m, margin_m):
+        assert (radius_m, margin_m) == (0.36, MARGIN_M)
+        return self.spare
+
+
+def test_what_is_kept_in_full_is_enough():
+    places = np.array([(199.4, 60.0, -20.0), (199.5, 60.0, -20.0)])  # to the margin of the fence
+    course, over = course_along(places, lands=False), course_along(places + (1e-6, 0.0, 0.0))
+    fleet = Guarded(1).fleet
+    for spare_m, clear in ((0.0, True), (-1e-9, False)):
+        seen = Seen(fleet, Spared(spare_m), MARGIN_M, Charge())
+        assert seen.is_clear(0, course) == clear
+        assert seen.may_stop(0, course, 0) == clear
+        assert not seen.may_stop(0, over, 0)
+    for spare, comes_home in ((0.0, True), (-1e-9, False)):
+        seen = Seen(fleet, NOTHING, MARGIN_M, Charge(lambda x, spare=spare: spare))
+        assert seen.comes_home(0, places[0]) == comes_home
 
 
 # stopping at once

@@ -7,7 +7,6 @@ braked then to a hover, which can be held.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +67,7 @@ class Course:
         return np.ascontiguousarray(path_m)
 
 
-def braked(vehicle: Any, course: Course, followed: int, steps: int) -> Course:
+def braked(vehicle: np.void, course: Course, followed: int, steps: int) -> Course:
     """A course followed for some steps, then braked to a hover.
 
     Args:

@@ -16,7 +16,7 @@ knows what is clear is its own affair: `Checks`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +65,7 @@ class Supervisor:
         braking_steps: After which every braked course hovers.
     """
 
-    def __init__(self, vehicles: Sequence[Any] | NDArray[np.void], dt_s: float) -> None:
+    def __init__(self, vehicles: Sequence[np.void], dt_s: float) -> None:
         self._vehicles = vehicles
         self.braking_steps = int(np.ceil(BRAKING_S / dt_s))
         self.backups: dict[int, Course] = {}
