@@ -197,7 +197,7 @@ class Spared:
 
 def test_what_is_kept_in_full_is_enough():
     places = np.array([(199.4, 60.0, -20.0), (199.5, 60.0, -20.0)])  # to the margin of the fence
-    course, over = course_along(places, lands=False), course_along(places + (1e-6, 0.0, 0.0))
+    course, over = course_along(places, lands=False), course_along(np.add(places, (1e-6, 0.0, 0.0)))
     fleet = Guarded(1).fleet
     for spare_m, clear in ((0.0, True), (-1e-9, False)):
         seen = Seen(fleet, Spared(spare_m), MARGIN_M, Charge())
