@@ -100,6 +100,7 @@ QUICK = {
     ),
     "routing/test_order_search.py": "but test_the_search_finds_the_optimum_of_all_orders",
     "paper/test_battery_figure.py": "",
+    "planning/test_backup_courses.py": "",
     "planning/test_reserves.py": "",
     "reproduction/test_comparison.py": "",
     "reproduction/test_told_events.py": "",
