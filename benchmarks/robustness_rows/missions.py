@@ -16,7 +16,7 @@ from uas_coverage_env.scenario.families.generated import N_OBSTACLES, N_UAS, N_W
 LEVELS = ("still", "light", "moderate", "strong")
 FIRST_SEED = 3000
 
-_NO_CLOCK = {"deterministic": "true", "at_once": "1", "horizon": "12", "threads": "1"}
+_NO_CLOCK = {"at_once": "1", "horizon": "12", "threads": "1"}
 OPTIONS: Mapping[str, Mapping[str, str]] = {
     "nearest-waypoint": {},
     "lawnmower": {},

@@ -15,7 +15,7 @@ from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_env import rollout
 from uas_coverage_env.flight.metrics import accomplished
 
-QUICK = {"deterministic": True, "at_once": 1, "horizon": 8, "threads": 1, "teams": 2}
+QUICK = {"at_once": 1, "horizon": 8, "threads": 1, "teams": 2}
 
 
 def milp(planner):

@@ -11,6 +11,7 @@ from uas_coverage_env.flight import (
     load_planner,
     planner_names,
     registry,
+    retired,
     rollout,
 )
 from uas_coverage_env.plugins.installed import entry_points
@@ -61,6 +62,16 @@ def test_the_simple_planners_are_installed():
 def test_an_unknown_planner_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match=r"unknown planner 'teleport'; allowed: .*hover, "):
         load_planner("teleport")
+
+
+@pytest.mark.parametrize("name", retired.FOLLOWERS)
+def test_a_planner_that_went_is_answered_with_one_that_flies(name):
+    with pytest.raises(InputError) as told:
+        load_planner(name)
+    assert str(told.value).startswith(f"unknown planner {name!r}; it went")
+    follows = str(told.value).partition("; fly ")[2].split()[0].rstrip(",")
+    assert follows in planner_names()
+    assert name not in planner_names()
 
 
 @pytest.mark.usefixtures("tuned")

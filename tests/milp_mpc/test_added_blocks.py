@@ -29,7 +29,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.simulation import World
 
-BY_NODES = Effort(deterministic=True, teams=2)
+BY_NODES = Effort(teams=2)
 PLANNERS = (MilpMpc, MilpMpcGuided)
 
 
@@ -54,7 +54,7 @@ def grounded():
 
 def made(planner, scenario, *added, **options):
     """The planner with blocks added, ready for the mission."""
-    options = {"deterministic": True, "horizon": 8, "teams": 1} | options
+    options = {"horizon": 8, "teams": 1} | options
     result = planner(planner.Options(**options), blocks=(*OCP, *added))
     result.reset(MissionBrief.of(scenario), 0)
     return result

@@ -63,7 +63,7 @@ def folder(tmp_path, monkeypatch):
 
 def run(*options, planner="milp-mpc", steps=8):
     words = ["run", "field.toml", "--planner", planner, "--steps", str(steps), "--out", "mine"]
-    always = ("deterministic=true", "horizon=8", "teams=1")
+    always = ("horizon=8", "teams=1")
     return main(
         [*words, *(word for option in (*always, *options) for word in ("--option", option))]
     )

@@ -18,7 +18,7 @@ from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.scenario import Execution, generate_scenario
 from uas_coverage_env.simulation import World
 
-REPEATABLE = GuidedOptions(deterministic=True, horizon=10)
+REPEATABLE = GuidedOptions(horizon=10)
 PLACES = [((60.0, 40.0 + 25.0 * k, -10.0), 8.0) for k in range(5)]
 STARTS = [(20.0, 20.0, -1.0), (20.0, 180.0, -1.0)]
 

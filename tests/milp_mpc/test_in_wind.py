@@ -105,7 +105,7 @@ def test_a_plan_goes_on_from_where_the_uas_is_and_leads_back_to_itself():
 
 def test_of_a_fleet_that_plans_in_turn_none_brakes_between_its_turns():
     town = generate_scenario(5, n_uas=2, n_waypoints=6, n_obstacles=2, disturbances="light")
-    options = GuidedOptions(horizon=10, in_wind="tube", deterministic=True, at_once=1, threads=1)
+    options = GuidedOptions(horizon=10, in_wind="tube", at_once=1, threads=1)
     flight = rollout(town, MilpMpcGuided(options), 0, max_steps=8)
     first_mps = np.hypot(flight.x[2:, 0, VX], flight.x[2:, 0, VY])
     assert first_mps[-1] > 10.0

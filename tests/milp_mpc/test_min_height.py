@@ -106,7 +106,7 @@ def test_a_file_of_decisions_holds_the_least_height(tmp_path):
 @pytest.mark.parametrize("planner", [MilpMpc, MilpMpcGuided])
 def test_a_whole_mission_is_flown_above_the_least_height(planner):
     town = generate_scenario(11, n_uas=1, n_waypoints=3, n_obstacles=1, min_height_m=4.0)
-    options = planner.Options(deterministic=True, horizon=8)
+    options = planner.Options(horizon=8)
     flight = rollout(town, planner(options))
     assert flight.breaches == 0
     assert flight.covered[-1] == 3

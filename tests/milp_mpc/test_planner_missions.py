@@ -134,7 +134,7 @@ def test_a_uas_that_is_at_home_and_still_moves_comes_to_rest_and_lands(horizon):
 
 @pytest.mark.slow
 def test_a_whole_mission_is_flown_to_its_end_without_a_violation():
-    options = {"deterministic": "true", "horizon": "12", "teams": "2"}
+    options = {"horizon": "12", "teams": "2"}
     town = generate_scenario(12, n_uas=2, n_waypoints=4, n_obstacles=2)
     flight = rollout(town, load_planner("milp-mpc", options), seed=0)
     assert accomplished(flight)

@@ -180,7 +180,7 @@ def test_where_nothing_shades_the_target_the_program_is_the_straight_one():
 
 def test_an_order_that_begins_behind_a_wall_leads_round_it_first():
     scenario = mission(BEHIND, [(40.0, 40.0, -1.0)], obstacles=[WALL])
-    made = MilpMpcGuided(GuidedOptions(deterministic=True, horizon=8))
+    made = MilpMpcGuided(GuidedOptions(horizon=8))
     made.reset(MissionBrief.of(scenario), 0)
     problem = made.problem(World(scenario).swarm_state())
     (tour,) = problem.tours

@@ -6,7 +6,7 @@ from small_worlds import meadow, waypoint
 
 from uas_coverage_env.flight import Why, load_planner, rollout
 
-LITTLE_MILP = {"deterministic": True, "horizon": 10, "threads": 1, "teams": 2, "at_once": 1}
+LITTLE_MILP = {"horizon": 10, "threads": 1, "teams": 2, "at_once": 1}
 PLANNERS = {
     "nearest-waypoint": {},
     "lawnmower": {},

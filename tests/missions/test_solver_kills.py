@@ -11,7 +11,7 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import Solution, SolveSta
 
 from uas_coverage_env import generate_scenario, independent_check, load_planner, rollout
 
-TOGETHER = {"deterministic": "true", "horizon": "8", "teams": "1", "threads": "1"}
+TOGETHER = {"horizon": "8", "teams": "1", "threads": "1"}
 QUICK = {**TOGETHER, "at_once": "1"}  # UAS are planned in turns: no joint program, a third the work
 RUNS = (1, 2, 3, 5, 8, 13)  # decisions in a row
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from uas_coverage_baselines.braking import brake
 from uas_coverage_baselines.milp_mpc import moving_horizon
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
@@ -18,6 +17,7 @@ from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight import load_planner
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.attempts import Attempts
+from uas_coverage_env.planning.backup import brake
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import compile_vehicle
@@ -25,7 +25,6 @@ from uas_coverage_env.vehicle.layout import DOD
 
 WALLS = Path(__file__).parent / "walls"
 CHEAP = {
-    "deterministic": "true",
     "at_once": "1",
     "horizon": "10",
     "time_limit_s": "0.25",

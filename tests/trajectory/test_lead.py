@@ -56,6 +56,17 @@ def test_the_model_in_a_wind_is_what_the_autopilot_believes_of_it(led):
         np.testing.assert_allclose(reduced_state(x), expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("wind_mps", [(0.0, 0.0), (3.0, -4.0), (-6.0, 8.0)])
+def test_a_plan_in_a_wind_leaves_room_for_gusts(led, wind_mps):
+    # gusts of a tenth of the wind, and a twenty-fifth of it upwards (`autopilot.belief`)
+    vehicle, speed_mps = led[1].vehicles[0], np.hypot(*wind_mps)
+    still = flight_model(vehicle, 0.0)
+    windy = in_wind(still, np.array(wind_mps))
+    assert windy.norms[0] == pytest.approx(12.0 - 0.1 * speed_mps)
+    np.testing.assert_array_equal(windy.norms[1:], still.norms[1:])
+    np.testing.assert_allclose(windy.vertical, np.array([3.0, 1.5]) - 0.04 * speed_mps)
+
+
 def test_what_leads_visits_all_waypoints_and_lands_within_its_airspeed(led):
     lead, arena, x, learnt = led
     scenario = steady()

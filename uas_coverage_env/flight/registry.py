@@ -22,6 +22,7 @@ from pydantic.fields import FieldInfo
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import did_you_mean, meant
 from uas_coverage_env.flight.planner import Planner, PlannerOptions, check_planner
+from uas_coverage_env.flight.retired import follower
 from uas_coverage_env.plugins.installed import entry_points
 from uas_coverage_env.plugins.named_objects import object_named
 from uas_coverage_env.plugins.users_code import described
@@ -177,7 +178,9 @@ def _not_made(name: str, error: Exception) -> InputError:
 def _unknown(name: str) -> InputError:
     argument = name.partition(":")[2][:80] or "..."
     known = (*planner_names(), *(f"{kind}:{argument}" for kind in sorted(_installed(KINDS))))
-    instead = did_you_mean(name, known, f"allowed: {', '.join(known)}, or MODULE:CLASS")
+    instead = follower(name) or did_you_mean(
+        name, known, f"allowed: {', '.join(known)}, or MODULE:CLASS"
+    )
     return InputError(f"unknown planner {name!r}; {instead}")
 
 

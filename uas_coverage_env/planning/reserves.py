@@ -44,8 +44,7 @@ class Reserve(NamedTuple):
 
 TOUR = Reserve(kept_s=30.0, spare_s=10.0, landing_s=3.0)
 """Of `tour`: what return mode asks for beyond the way home at full speed; and a landing from full
-speed over the start to rest on it. Chosen by hand; `benchmarks/tour.py` sets the times of its
-orders beside those that are flown."""
+speed over the start to rest on it. Chosen by hand."""
 
 TOUR_SCARCE = Reserve(kept_s=20.0, spare_s=3.0, landing_s=3.0)
 """Of `tour` once charge does not suffice for all. With it and other changes of 0.3.0 it covered
@@ -60,7 +59,7 @@ beside those of the files."""
 TRAJECTORY = Reserve(kept_s=6.0, landing_s=4.0, legs_share=0.96)
 """Of the routes of `trajectory`, whose flights keep a backup besides, and come to rest above the
 start. `legs_share` was measured on generated towns, the others were chosen by hand;
-`benchmarks/trajectory.py` shows what harm is done."""
+`uas-coverage compare` shows what harm is done."""
 
 TRAJECTORY_WITH_ROOM = TRAJECTORY._replace(time_share=0.91)
 """The same where the plant is not the model: flights are slower, and come some steps later."""
@@ -73,10 +72,14 @@ LEARNED_ROUTE = TRAJECTORY._replace(spare_s=8.0)
 """Of `learned-route`: that of the routes its networks learnt from; they read these numbers."""
 
 ORDER_GUIDE = Reserve(kept_s=25.0, landing_s=4.0)
-"""Of the order that `milp-mpc-guided` follows, somewhat more than `MILP_RESERVE` and `BRAKING_S`
-hold back for braking and landing. Chosen by hand; `benchmarks/missions.py` shows what is flown."""
+"""Of the order that `milp-mpc-guided` follows, somewhat more than `MILP_RESERVE` and
+`MILP_BRAKING_S` hold back for braking and landing. Chosen by hand."""
 
-BRAKING_S = 16.0
+BRAKING_S = 14.0
+"""Braking with the inner loop has ended after this time, from any speed [s]. What it is enough for:
+`tests/milp_mpc/test_plan_verification.py`."""
+
+MILP_BRAKING_S = 16.0
 """Of `milp-mpc`: braking to a hover where a plan ends, and turning home [s]. Twice the 8 s of its
 first version, in which braking did not fit; the command is not recorded. What it is enough for:
 `tests/milp_mpc/test_battery_reserve.py`."""

@@ -83,8 +83,7 @@ class MilpMpcGuided(MovingHorizon[GuidedOptions]):
         """
         super().reset(brief, seed)
         self._builder = ProblemBuilder(brief, self.options, Ways(brief))
-        decision_s = self.options.threads * self.options.time_limit_s
-        made = brief, self._builder, TourShape(), decision_s
+        made = brief, self._builder, TourShape()
         if self.options.order == "trajectory":
             order, total_weight = self._order_of_trajectory(brief, seed)
             self._guide = RouteGuide(*made, total_weight)

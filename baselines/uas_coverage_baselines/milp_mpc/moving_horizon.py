@@ -78,8 +78,8 @@ class MovingHorizon(ABC, Generic[Chosen]):
         return self._attempts.given_up
 
     def rehearsal(self) -> Self:
-        """The same planner with a short horizon, and time enough to compile everything."""
-        quick = self.options.model_copy(update={"time_limit_s": 10.0, "horizon": 8})
+        """The same planner with a short horizon, and no limit while everything is compiled."""
+        quick = self.options.model_copy(update={"time_limit_s": None, "horizon": 8})
         return type(self)(quick, self._given)
 
     def warm_up(self, brief: MissionBrief) -> None:
@@ -173,7 +173,8 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self.plan, self._backup = plan.advanced(), backup.advanced()
         paths = {name: path for name, path in plan.positions().items() if name in swarm.active}
         gap = None if reason else plan.relative_gap()
-        self.last_decision = Decision(paths, reason is not None, gap, reason)
+        late = Reason.CUT_SHORT if plan.cut_short else None
+        self.last_decision = Decision(paths, reason is not None, gap, reason or late)
         if self._in_wind is not None:
             return self._in_wind.velocities(plan, swarm, self._announced)
         return first_inputs(plan, swarm, self._announced)
@@ -209,12 +210,12 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def _effort(self) -> Effort:
         return Effort(
-            time_limit_s=self.options.time_limit_s,
+            work=self.options.effort,
             threads=self.options.threads,
-            deterministic=self.options.deterministic,
             teams=self.options.teams,
             at_once=self.options.at_once,
             solver=self.options.solver,
+            time_limit_s=self.options.time_limit_s,
         )
 
     def _announced(self, name: str) -> Mode:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
@@ -22,7 +22,7 @@ from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named, chec
 from uas_coverage_baselines.milp_mpc.model.ocp import PAPER_OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
-from uas_coverage_baselines.milp_mpc.options import ModeOptions, with_default
+from uas_coverage_baselines.milp_mpc.options import ModeOptions, TimeLimitS, with_default
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
 from uas_coverage_baselines.milp_mpc.solvers.interface import SolverError, SolveStatus
@@ -33,10 +33,6 @@ from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.world import Command, SwarmState
 
 _ROUNDING_M = 1e-5  # a solution keeps its rows to 2e-6, and a breach is one by any amount
-
-
-def _endless(text: Any) -> Any:
-    return None if text in ("none", "inf") else text
 
 
 class PaperOptions(ModeOptions):
@@ -56,7 +52,7 @@ class PaperOptions(ModeOptions):
         le=100.0,
         description="or the absolute gap this, in steps that a waypoint of weight 1 stays open",
     )
-    time_limit_s: Annotated[float | None, BeforeValidator(_endless)] = Field(
+    time_limit_s: TimeLimitS = Field(
         default=None, gt=0.0, description="wall clock per decision [s]; none: until the gap"
     )
     threads: int = Field(default=1, ge=1, le=64, description="of the solver")

@@ -27,8 +27,7 @@ from uas_coverage_env.world import SwarmState
 FloatArray = NDArray[np.float64]
 _MOVES_PER_WAYPOINT = 40_000  # of the first search, before take-off
 _MOVES_AT_MOST = 4_000_000
-_MOVES_AFTERWARDS = 60_000  # of each decision's, at most
-_MOVES_PER_S = 30_000  # of the decision's time limit, over all threads
+_MOVES_AFTERWARDS = 60_000  # of each decision's
 _FIRST_SEARCHES = 3
 _SEARCHED_AGAIN = 60  # waypoints of each route, at most, at every decision
 _WORTH_CHANGING_S = 0.5
@@ -64,12 +63,10 @@ class RouteGuide:
         brief: MissionBrief,
         builder: ProblemBuilder,
         shape: TourShape,
-        decision_s: float = np.inf,
         total_weight: float = SearchEffort.total_weight,
     ) -> None:
         self._brief, self._builder, self._shape = brief, builder, shape
         self._glance = SearchEffort(0, total_weight=total_weight)  # costs alone, no search
-        self._moves = int(min(_MOVES_AFTERWARDS, _MOVES_PER_S * decision_s))
         self._legs = Legs(brief)
         self._names = tuple(uas.name for uas in brief.uas)
         self._radius_m = np.array([w.radius_m for w in brief.waypoints])
@@ -98,7 +95,7 @@ class RouteGuide:
         """Bring the order up to date with what is seen now."""
         previous = self._order or empty_routes(len(self._names))
         problem = self._problem(swarm)
-        effort = replace(self._glance, moves=self._moves, hottest_s=1.5, window=24)
+        effort = replace(self._glance, moves=_MOVES_AFTERWARDS, hottest_s=1.5, window=24)
         kept = improve_routes(problem, previous, self._glance, 0)
         part = RouteWindow.of(problem, kept, _SEARCHED_AGAIN)
         first = kept

@@ -30,9 +30,8 @@ class Steering:
     """
 
     def __init__(self, brief: MissionBrief, options: MovingHorizonOptions, seed: int) -> None:
-        decision_s = options.threads * options.time_limit_s
         builder = ProblemBuilder(brief, options)
-        self._guide = RouteGuide(brief, builder, TourShape(), decision_s)
+        self._guide = RouteGuide(brief, builder, TourShape())
         self._guide.begin(first_sight(brief), seed)
         self._following = Following(brief, calls_home=False)
 

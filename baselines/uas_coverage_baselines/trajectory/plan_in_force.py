@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.trajectory.course import BRAKING_S
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.mission_plan import MissionPlan, Planned
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
 from uas_coverage_baselines.trajectory.waiting import Waiting
 from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.world import SwarmState
 
 BoolArray = NDArray[np.bool_]

@@ -375,6 +375,7 @@ class Plan:
         objective: J without what the plan cannot influence.
         bound: proven lower bound of the best objective; -inf where none.
         renewed: the UAS whose part of it is newly planned; the others go on as before.
+        cut_short: whether a time limit has ended the search for it.
     """
 
     names: tuple[str, ...]
@@ -384,6 +385,7 @@ class Plan:
     objective: float
     bound: float
     renewed: tuple[str, ...] = ()
+    cut_short: bool = False
 
     def of(self, name: str) -> int:
         """Row of a UAS."""

@@ -63,7 +63,8 @@ def solve(
     values = None
     if info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible:
         values = np.array(solver.getSolution().col_value)
-    claim = Claim(values, bound, optimal, status == highspy.HighsModelStatus.kInfeasible)
+    infeasible = status == highspy.HighsModelStatus.kInfeasible
+    claim = Claim(values, bound, optimal, infeasible, max(info.simplex_iteration_count, 0))
     return confirmed(claim, milp, lower, upper, time.perf_counter() - began)
 
 

@@ -74,6 +74,7 @@ class Solution:
         bound: proven lower bound of the objective; -inf where none.
         violation: largest violation of what the solver returned, rounded; inf where nothing.
         wall_time_s: duration.
+        iterations: simplex iterations, those in sub-programs left out.
     """
 
     status: SolveStatus
@@ -82,6 +83,7 @@ class Solution:
     bound: float
     violation: float
     wall_time_s: float
+    iterations: int = 0
 
 
 class Solve(Protocol):
@@ -126,12 +128,14 @@ class Claim:
         bound: lower bound of the objective; -inf where none.
         optimal: whether the solver calls `values` optimal within the gap.
         infeasible: whether it calls the program infeasible.
+        iterations: simplex iterations that it counts.
     """
 
     values: FloatArray | None
     bound: float
     optimal: bool
     infeasible: bool
+    iterations: int = 0
 
 
 def confirmed(
@@ -153,8 +157,10 @@ def confirmed(
         violation = milp.violation(values)
     if values is None or violation > TOLERANCE:
         outcome = SolveStatus.INFEASIBLE if claim.infeasible else SolveStatus.NO_SOLUTION
-        return Solution(outcome, None, np.inf, claim.bound, violation, wall_time_s)
+        return Solution(
+            outcome, None, np.inf, claim.bound, violation, wall_time_s, claim.iterations
+        )
     outcome = SolveStatus.OPTIMAL if claim.optimal else SolveStatus.FEASIBLE
     objective = float(milp.objective(values))
     bound = min(float(claim.bound), objective)
-    return Solution(outcome, values, objective, bound, violation, wall_time_s)
+    return Solution(outcome, values, objective, bound, violation, wall_time_s, claim.iterations)
