@@ -80,9 +80,10 @@ def _drawn(path: str, number: int) -> Any:
     """The mutant with a number of a file, None beyond the last."""
     from cosmic_ray.commands.init import _all_work_items
 
-    lines = (ROOT / path).read_text("utf-8").split("\n")
+    file = Path(_tree().name, path)
+    lines = file.read_text("utf-8").split("\n")
     wanted = set(_operators())
-    mutants = [item.mutations[0] for item in _all_work_items([ROOT / path], {})]
+    mutants = [item.mutations[0] for item in _all_work_items([file], {})]
     # of an array with one record, [0] and [-1] are the same
     mutants = [
         one for one in mutants
