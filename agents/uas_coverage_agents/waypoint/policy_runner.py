@@ -30,7 +30,7 @@ from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.guided_flight import GuidedFlight
-from uas_coverage_env.mission.handover import Handover
+from uas_coverage_env.planning.around.handover import Handover
 from uas_coverage_env.world import Command, GoTo, SwarmState, WorldState
 
 

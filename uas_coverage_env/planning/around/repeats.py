@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.mission.brief import MissionBrief
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Waypoint
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
@@ -39,20 +39,16 @@ class Repeats:
 
     Attributes:
         brief: The same with each place once; in what follows P is the number of places.
-        asked_in_s: (P,) from the last sample until each place to plan for can be covered [s]; 0 for
-            all others, and for what can be covered at once.
-        has_grown: Whether there was more to plan for at the last sample than at the one before.
     """
 
     def __init__(self, brief: MissionBrief) -> None:
         self._rows, self.brief = _with_places(brief)
         n_places = len(self.brief.waypoints)
         self._open = np.zeros(n_places, np.bool_)
-        self._wanted, self.has_grown = self._open.copy(), False
+        self._wanted = self._open.copy()
         alone = brief.sorties is not None and not brief.sorties.together
         swap_s = brief.sorties.swap_s if brief.sorties is not None and alone else 0.0
         self._soon_s = min(_SOON_S + swap_s, _LONGEST_S)
-        self.asked_in_s = np.zeros(n_places)
 
     @classmethod
     def of(cls, brief: MissionBrief) -> Repeats | None:
@@ -74,6 +70,8 @@ class Repeats:
     def seen(self, swarm: SwarmState, is_idle: bool) -> SwarmState:
         """What is seen, `uncovered` being the (P,) places to plan for; once per sample.
 
+        `again_s` says from when on each place can be covered: 0 where it is open.
+
         Args:
             swarm: As the world shows it.
             is_idle: Whether a UAS flies that has nothing more to visit.
@@ -84,33 +82,23 @@ class Repeats:
         np.minimum.at(again_s, self._rows, swarm.again_s)
         # what was covered is open no more, nor what is dropped going to be
         self._wanted &= open_now | (np.isfinite(again_s) & ~self._open)
-        before = self._wanted.sum()
         if is_idle or (open_now & ~self._wanted).any():
             left_s = self.brief.dt_s * (self.brief.max_steps - swarm.step)
             soon = np.sort(again_s[again_s < left_s])
             gaps = np.diff(soon, prepend=0.0) > self._soon_s
             n_soon = int(gaps.argmax()) if gaps.any() else len(soon)
             self._wanted |= open_now | (again_s <= np.append(-np.inf, soon)[n_soon])
-        self._open, self.has_grown = open_now, bool(self._wanted.sum() > before)
+        self._open = open_now
         # at the sample at which a place opens it cannot be covered yet
-        self.asked_in_s = np.where(self._wanted & ~open_now, again_s + self.brief.dt_s, 0.0)
-        return replace(swarm, uncovered=self._wanted.copy())
+        again_s = np.where(open_now, 0.0, again_s + self.brief.dt_s)
+        return replace(swarm, uncovered=self._wanted.copy(), again_s=again_s)
 
-    @property
-    def steps_until_open(self) -> NDArray[np.int64]:
-        """(P,) the same in steps, rounded up."""
-        return np.ceil(self.asked_in_s / self.brief.dt_s - _ROUNDING).astype(np.int64)
-
-    def open_now(self, swarm: SwarmState) -> SwarmState:
-        """What is seen, without the places that open later; for planners that do not wait.
-
-        Args:
-            swarm: As `seen` returned it.
-        """
-        return replace(swarm, uncovered=swarm.uncovered & self._open)
+    def row(self, place: int) -> int:
+        """The waypoint that a place is now: the last that it was asked for as."""
+        return int(np.flatnonzero(self._rows == place)[-1])
 
     def addressed(self, commands: Mapping[str, Command]) -> dict[str, Command]:
-        """Commands to fly to the waypoints that places are now: the last they were asked for as.
+        """Commands to fly to the waypoints that places are now.
 
         Args:
             commands: Those that send UAS to places.
@@ -120,8 +108,29 @@ class Repeats:
     def _addressed(self, command: Command) -> Command:
         if not isinstance(command, GoTo) or command.waypoint is None:
             return command
-        rows = np.flatnonzero(self._rows == command.waypoint)
-        return replace(command, waypoint=int(rows[-1]))
+        if not 0 <= command.waypoint < len(self._open):
+            return command  # the world says what is wrong with it
+        return replace(command, waypoint=self.row(command.waypoint))
+
+
+def asked_in_s(swarm: SwarmState) -> FloatArray:
+    """(W,) until each waypoint to plan for can be covered [s]; 0 for what can be at once.
+
+    Args:
+        swarm: As a planner is shown it.
+    """
+    later_s = swarm.again_s if len(swarm.again_s) else np.zeros(len(swarm.uncovered))
+    return np.where(swarm.uncovered & np.isfinite(later_s), later_s, 0.0)
+
+
+def steps_until_open(swarm: SwarmState, dt_s: float) -> NDArray[np.int64]:
+    """(W,) the same in steps, rounded up."""
+    return np.ceil(asked_in_s(swarm) / dt_s - _ROUNDING).astype(np.int64)
+
+
+def open_now(swarm: SwarmState) -> SwarmState:
+    """What is shown, without the waypoints that open later; for planners that do not wait."""
+    return replace(swarm, uncovered=swarm.uncovered & (asked_in_s(swarm) <= 0.0))
 
 
 def _with_places(brief: MissionBrief) -> tuple[NDArray[np.int64], MissionBrief]:

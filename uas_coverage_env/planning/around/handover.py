@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.state import FLYING, LANDED
-from uas_coverage_env.mission.brief import MissionBrief
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import SwarmState
 
 BoolArray = NDArray[np.bool_]
@@ -56,6 +56,8 @@ class Handover:
 def without(swarm: SwarmState, uas: BoolArray) -> SwarmState:
     """What is seen, some UAS out of the mission as if they had landed for good.
 
+    `away` says that they fly nevertheless, and have to be kept clear of.
+
     Args:
         swarm: What is seen.
         uas: (U,) those.
@@ -63,4 +65,10 @@ def without(swarm: SwarmState, uas: BoolArray) -> SwarmState:
     if not uas.any():
         return swarm
     packs_left = np.where(uas, 0, swarm.packs_left) if len(swarm.packs_left) else swarm.packs_left
-    return replace(swarm, status=np.where(uas, LANDED, swarm.status), packs_left=packs_left)
+    status, away = np.where(uas, LANDED, swarm.status), uas | away_of(swarm)
+    return replace(swarm, status=status, away=away, packs_left=packs_left)
+
+
+def away_of(swarm: SwarmState) -> BoolArray:
+    """(U,) UAS that fly without a part in the mission."""
+    return swarm.away if len(swarm.away) else np.zeros(len(swarm.status), np.bool_)

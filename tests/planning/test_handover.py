@@ -9,7 +9,7 @@ from small_worlds import meadow
 from uas_coverage_env import MissionBrief
 from uas_coverage_env.entities.state import FLYING, LANDED, LOST
 from uas_coverage_env.mission import first_sight
-from uas_coverage_env.mission.handover import SILENT_S, Handover, without
+from uas_coverage_env.planning.around.handover import SILENT_S, Handover, without
 
 
 @pytest.fixture

@@ -4,7 +4,8 @@ import numpy as np
 from small_worlds import meadow, waypoint
 
 from uas_coverage_env import World
-from uas_coverage_env.mission import MissionBrief, Repeats
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.around.repeats import Repeats, asked_in_s, open_now, steps_until_open
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.world import GoTo, Velocity
 
@@ -84,15 +85,14 @@ def test_what_opens_soon_is_planned_for_once_a_uas_has_nothing_else_to_visit():
     told.step(HOVERS)
     assert not told.told.uncovered.any()
     told.step(HOVERS, is_idle=True)
-    assert told.repeats.has_grown
     assert told.told.uncovered.tolist() == [True]
     # it opens in 18 s, and can be covered a step later
-    assert told.repeats.asked_in_s.tolist() == [19.0]
-    assert told.repeats.steps_until_open.tolist() == [19]
-    assert not told.repeats.open_now(told.told).uncovered.any()
+    assert asked_in_s(told.told).tolist() == [19.0]
+    assert steps_until_open(told.told, 1.0).tolist() == [19]
+    assert not open_now(told.told).uncovered.any()
     for _ in range(18):
         told.step(HOVERS)
-    assert told.repeats.asked_in_s.tolist() == [0.0]
+    assert asked_in_s(told.told).tolist() == [0.0]
     assert told.world.state.uncovered.tolist() == [False, True]
 
 
@@ -110,7 +110,8 @@ def test_a_place_that_opens_brings_along_all_that_open_soon_after():
     while len(told.world.known.waypoints) == 3:
         told.step(HOVERS)
     assert told.told.uncovered.tolist() == [True, True, False]
-    assert told.repeats.asked_in_s[0] == 0.0 < told.repeats.asked_in_s[1] <= 31.0
+    in_s = asked_in_s(told.told)
+    assert in_s[0] == 0.0 < in_s[1] <= 31.0
 
 
 def test_a_uas_whose_swap_takes_longer_waits_longer_in_the_air():

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.by_legs.course import Course, CoursePlanner
 from uas_coverage_env.mission import MissionBrief, WorldView
 from uas_coverage_env.mission.recall import Recall
+from uas_coverage_env.planning.execution.leg_course import Course, CoursePlanner
 from uas_coverage_env.planning.execution.separation import Waits, separate
 from uas_coverage_env.world import Command, GoTo, SwarmState, Velocity
 

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.kernels import interpreted
 from uas_coverage_env.entities.state import FLYING, LANDED, LOST
-from uas_coverage_env.mission.brief import MissionBrief
-from uas_coverage_env.mission.handover import Handover
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.range import Range
 from uas_coverage_env.mission.views import WorldView
 from uas_coverage_env.mission.ways import Ways
+from uas_coverage_env.planning.around.handover import Handover
 from uas_coverage_env.vehicle.layout import DOD, VX
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.world import SwarmState

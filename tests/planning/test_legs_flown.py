@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
-from uas_coverage_baselines.by_legs.course import CoursePlanner
-from uas_coverage_baselines.by_legs.follower import LegFollower
 
 from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.flight.metrics import coverage
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.planning.execution.lateness import Timed, pairs_of
+from uas_coverage_env.planning.execution.leg_course import CoursePlanner
+from uas_coverage_env.planning.execution.leg_follower import LegFollower
 from uas_coverage_env.planning.execution.leg_model import Autopilot
 from uas_coverage_env.planning.routing.clock import CUTTING
 from uas_coverage_env.planning.routing.legs import Legs
