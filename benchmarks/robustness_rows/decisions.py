@@ -21,7 +21,6 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
     "lawnmower": ({}, None),
     "tour": ({}, None),
     "trajectory": ({}, None),
-    "learned-waypoint": ({}, None),
     "learned-velocity": ({}, None),
     "learned-route": ({}, None),
     "milp-mpc": ({"threads": "1", "time_limit_s": f"{LIMIT_S:g}"}, 12),
@@ -34,7 +33,6 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
 _MISSIONS = {
     "tour": (3, 60),
     "trajectory": (2, 30),
-    "learned-waypoint": (1, 30),
     "learned-route": (1, 30),
     "milp-mpc": (2, 30),
     "milp-mpc-guided": (2, 30),

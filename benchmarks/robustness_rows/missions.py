@@ -22,7 +22,6 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "lawnmower": {},
     "tour": {},
     "trajectory": {},
-    "learned-waypoint": {},
     "learned-velocity": {},
     "learned-route": {},
     "milp-mpc-guided": _NO_CLOCK,
@@ -35,7 +34,6 @@ so that a seed repeats its flight."""
 _MISSIONS = {
     "tour": (6, 300, 30),
     "trajectory": (4, 300, 10),
-    "learned-waypoint": (1, 300, 10),
     "learned-route": (1, 300, 10),
     "milp-mpc-guided": (1, 300, 1),
     "milp-mpc-guided in_wind=tube": (1, 30, 1),

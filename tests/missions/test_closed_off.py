@@ -15,7 +15,6 @@ PLANNERS = {
     "milp-mpc": LITTLE_MILP,
     "milp-mpc-guided": LITTLE_MILP,
     "learned-route": {"samples": 4, "changes": 1000, "rehearsed": 1},
-    "learned-waypoint": {},
     "learned-velocity": {},
 }
 

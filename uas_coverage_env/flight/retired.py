@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 FOLLOWERS: Mapping[str, str] = {
-    "learned-waypoint": "learned-route, or a policy of your own on `action=\"waypoint\"` "
+    "learned-waypoint": 'learned-route, or a policy of your own on `action="waypoint"` '
     "(`uas-coverage train maskable-ppo`)",
 }
 """A planner of an earlier version -> what to fly now, as it ends `fly ...`."""
