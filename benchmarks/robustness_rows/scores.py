@@ -74,6 +74,5 @@ ROW = Row(
     trials,
     finding,
     lambda quick: "the validation missions of the policies, in their order",
-    "The search in simulation that `learned-waypoint` adds to its network, and, where fewer "
-    "missions are flown than were published, a comparison of the means.",
+    "Where fewer missions are flown than were published, a comparison of the means.",
 )
