@@ -54,7 +54,7 @@ REASONS = {
 }
 """Why flights of a scenario and a dynamics are not the same as before, to the bit."""
 
-_REPEATABLE = {"deterministic": True, "horizon": 10, "threads": 1}
+_REPEATABLE = {"horizon": 10, "threads": 1}
 
 
 @dataclass(frozen=True)

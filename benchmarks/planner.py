@@ -236,7 +236,7 @@ def joint(
         problem = _reached(problem)
         cells, alone_s = [f"{step}"], 0.0
         for name in (None, *names):
-            effort = Effort(deterministic=True, threads=1, joint=name)
+            effort = Effort(threads=1, joint=name)
             began = time.process_time()
             plan = decide(replace(problem), None, problem.dt_s, effort)
             took_s = time.process_time() - began
@@ -411,7 +411,7 @@ def _with_all_open(
 @app.command()
 def states() -> None:
     """Fly the village deterministically and store the decisions of some samples."""
-    planner = _Recording(MilpMpcOptions(deterministic=True))
+    planner = _Recording(MilpMpcOptions())
     rollout(load_scenario("village"), planner, max_steps=max(STORED) + 1)
     problems = [planner.kept[step] for step in STORED]
     write_problems(DECISIONS, "python benchmarks/planner.py states", problems, STORED)

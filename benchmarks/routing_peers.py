@@ -17,7 +17,6 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -26,18 +25,19 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from scale import town
-from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
 
 from uas_coverage_env import MissionBrief
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.mission import first_sight
+from uas_coverage_env.planning.reserves import TRAJECTORY
 from uas_coverage_env.planning.routing import (
     Routes,
-    RoutingTask,
+    RoutingProblem,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
+from uas_coverage_env.planning.routing.terrain import Terrain
 
 console = Console(width=130)
 _MS = 1000.0
@@ -45,10 +45,6 @@ SECONDS, COST = range(2)
 _FIRST_MOVES, _MOST_MOVES = 5_000, 20_000_000
 _GAPS = 0.01, 0.05
 _PER_BATTERY = 25  # waypoints
-_PER_UAS = (
-    *("first_s", "kind", "home_s", "idle_s", "position_m", "velocity_mps", "speed_mps"),
-    *("acceleration_mps2", "start_m", "turn_s"),
-)
 
 
 class Found(NamedTuple):
@@ -63,26 +59,25 @@ class Found(NamedTuple):
     routes: list[list[int]]
 
 
-def task_of(n_uas: int, n_waypoints: int, seed: int) -> RoutingTask:
+def problem_of(n_uas: int, n_waypoints: int, seed: int) -> RoutingProblem:
     """The routing problem of a town before take-off; batteries are not what is compared."""
     enough = max(n_uas, -(-n_waypoints // _PER_BATTERY))
     brief = MissionBrief.of(town(enough, n_waypoints, seed))
-    x = first_sight(brief).x
-    everything, nothing = np.ones(n_waypoints, np.bool_), np.zeros(n_waypoints, np.int64)
-    moment = Moment(x, np.ones(enough, np.bool_), everything, nothing, 0.0)
-    task = Fleet(brief, 0.3).task(moment, np.zeros(enough))
-    fewer = {name: getattr(task, name)[:n_uas] for name in _PER_UAS}
-    return replace(task, **fewer, budget_s=np.full(n_uas, 1e6))
+    works = np.ones(enough, np.bool_)
+    problem = RoutingProblem.seen(brief, first_sight(brief), Terrain(brief), works, TRAJECTORY)
+    per_uas = "uas", "first_s", "home_s", "turn_s", "forbidden"
+    fewer = {name: getattr(problem, name)[:n_uas] for name in per_uas}
+    return problem.replace(**fewer).replace(budget_s=np.full(n_uas, 1e6))
 
 
-def own(task: RoutingTask, weight: float, seconds: float, seed: int) -> Found:
+def own(problem: RoutingProblem, weight: float, seconds: float, seed: int) -> Found:
     """Searches of this package, each twice as long as the one before."""
     trace, best, moves = [], None, _FIRST_MOVES
-    improve_routes(task, empty_routes(task.n_uas), SearchEffort(10, by_pieces=True), 0)
+    improve_routes(problem, empty_routes(problem.n_uas), SearchEffort(10, by_pieces=True), 0)
     while moves < _MOST_MOVES:
         began = time.process_time()
         effort = SearchEffort(moves, total_weight=weight, by_pieces=True)
-        order = improve_routes(task, empty_routes(task.n_uas), effort, seed)
+        order = improve_routes(problem, empty_routes(problem.n_uas), effort, seed)
         took = time.process_time() - began
         trace.append((took, order.cost_s))
         if best is None or order.cost_s < best.cost_s:
@@ -94,19 +89,19 @@ def own(task: RoutingTask, weight: float, seconds: float, seed: int) -> Found:
     return Found(np.array(trace), [route.tolist() for route in best.routes])
 
 
-def _arcs_s(task: RoutingTask, uas: int) -> NDArray[np.float64]:
+def _arcs_s(problem: RoutingProblem, uas: int) -> NDArray[np.float64]:
     """(W+U, W+U) times of a UAS between waypoints, then starts; setting off included."""
-    n, n_uas = task.n_waypoints, task.n_uas
+    n, n_uas = problem.n_waypoints, problem.n_uas
     arcs = np.zeros((n + n_uas, n + n_uas))
-    arcs[:n, :n] = task.between_s[task.kind[uas]]
-    setting_off_s = task.speed_mps[uas] / (2.0 * task.acceleration_mps2[uas])
+    arcs[:n, :n] = problem.between_s[problem.uas["kind"][uas]]
+    setting_off_s = problem.uas["speed_mps"][uas] / (2.0 * problem.uas["acceleration_mps2"][uas])
     for u in range(n_uas):
-        arcs[n + u, :n] = task.first_s[u] + setting_off_s
-        arcs[:n, n + u] = task.home_s[u]
+        arcs[n + u, :n] = problem.first_s[u] + setting_off_s
+        arcs[:n, n + u] = problem.home_s[u]
     return arcs
 
 
-def or_tools(task: RoutingTask, weight: float, seconds: float, seed: int) -> Found:
+def or_tools(problem: RoutingProblem, weight: float, seconds: float, seed: int) -> Found:
     """Guided local search from the cheapest arcs."""
     del seed  # it draws nothing
     from ortools.constraint_solver import (
@@ -114,11 +109,11 @@ def or_tools(task: RoutingTask, weight: float, seconds: float, seed: int) -> Fou
         routing_enums_pb2,
     )
 
-    n, n_uas = task.n_waypoints, task.n_uas
+    n, n_uas = problem.n_waypoints, problem.n_uas
     ends = [n + u for u in range(n_uas)]
     manager = pywrapcp.RoutingIndexManager(n + n_uas, n_uas, ends, ends)
     routing = pywrapcp.RoutingModel(manager)
-    arcs_ms = np.round(_MS * _arcs_s(task, 0)).astype(np.int64)
+    arcs_ms = np.round(_MS * _arcs_s(problem, 0)).astype(np.int64)
     flight = routing.RegisterTransitMatrix(arcs_ms.tolist())
     price = routing.RegisterTransitMatrix(np.round(weight * arcs_ms).astype(np.int64).tolist())
     routing.SetArcCostEvaluatorOfAllVehicles(price)
@@ -149,15 +144,15 @@ def or_tools(task: RoutingTask, weight: float, seconds: float, seed: int) -> Fou
     return Found(np.array(trace), routes)
 
 
-def pyvrp(task: RoutingTask, weight: float, seconds: float, seed: int) -> Found | None:
+def pyvrp(problem: RoutingProblem, weight: float, seconds: float, seed: int) -> Found | None:
     """Iterated local search of PyVRP; None where several UAS fly."""
     from pyvrp import Model
 
-    if task.n_uas > 1:
+    if problem.n_uas > 1:
         return None
-    arcs_ms = np.round(_MS * _arcs_s(task, 0)).astype(np.int64)
+    arcs_ms = np.round(_MS * _arcs_s(problem, 0)).astype(np.int64)
     model: Any = Model()
-    places = [model.add_location(x=0, y=0) for _ in range(task.n_waypoints + 1)]
+    places = [model.add_location(x=0, y=0) for _ in range(problem.n_waypoints + 1)]
     depot = model.add_depot(places[-1])
     for place in places[:-1]:
         model.add_client(place)
@@ -185,24 +180,24 @@ def _clients(route: Any) -> list[int]:
     return [activity.idx for activity in visits]
 
 
-SOLVERS: dict[str, Callable[[RoutingTask, float, float, int], Found | None]] = {
+SOLVERS: dict[str, Callable[[RoutingProblem, float, float, int], Found | None]] = {
     "this package": own,
     "OR-Tools": or_tools,
     "PyVRP": pyvrp,
 }
 
 
-def flown_cost_s(task: RoutingTask, routes: list[list[int]], weight: float) -> float:
+def flown_cost_s(problem: RoutingProblem, routes: list[list[int]], weight: float) -> float:
     """What an order costs with its turns."""
     seconds, nobody = np.zeros(len(routes)), np.zeros(0, np.int64)
     order = Routes(tuple(np.array(r, np.int64) for r in routes), nobody, seconds, np.inf)
-    return improve_routes(task, order, SearchEffort(0, total_weight=weight), 0).cost_s
+    return improve_routes(problem, order, SearchEffort(0, total_weight=weight), 0).cost_s
 
 
 def measure(table: Table, n_uas: int, n_waypoints: int, seconds: float, weight: float) -> None:
     """All solvers on one size: a row each."""
-    task = task_of(n_uas, n_waypoints, 1)
-    arcs_only = replace(task, turn_s=np.zeros_like(task.turn_s))
+    problem = problem_of(n_uas, n_waypoints, 1)
+    arcs_only = problem.replace(turn_s=np.zeros_like(problem.turn_s))
     found: dict[str, list[Found]] = {}
     for name, solver in SOLVERS.items():
         seeds = range(1 if solver is or_tools else 3)
@@ -210,14 +205,16 @@ def measure(table: Table, n_uas: int, n_waypoints: int, seconds: float, weight: 
         found[name] = [run for run in runs if run is not None]
     best = min(run.trace[:, COST].min() for runs in found.values() for run in runs)
     effort = SearchEffort(2_000_000, total_weight=weight, by_pieces=True)
-    turning = improve_routes(task, empty_routes(n_uas), effort, 0).cost_s
+    turning = improve_routes(problem, empty_routes(n_uas), effort, 0).cost_s
     for name, runs in found.items():
         if not runs:
             table.add_row(f"{n_uas} x {n_waypoints}", name, *["-"] * 4)
             continue
         cells = [_median([_time_to(run, best * (1.0 + gap)) for run in runs]) for gap in _GAPS]
         last = [100.0 * (run.trace[:, COST].min() / best - 1.0) for run in runs]
-        flown = [100.0 * (flown_cost_s(task, run.routes, weight) / turning - 1.0) for run in runs]
+        flown = [
+            100.0 * (flown_cost_s(problem, run.routes, weight) / turning - 1.0) for run in runs
+        ]
         cells += [f"{np.median(last):.2f}", f"{np.median(flown):+.1f}"]
         table.add_row(f"{n_uas} x {n_waypoints}", name, *cells)
 

@@ -29,10 +29,10 @@ import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
-from trajectory import Row, fly
 
-from uas_coverage_env import MissionBrief, Scenario, load_planner
+from uas_coverage_env import MissionBrief, Scenario, load_planner, rollout
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight.figures import summary
 from uas_coverage_env.scenario import generate_scenario
 
 console = Console(width=150)
@@ -55,7 +55,7 @@ class Measured:
         n_without: UAS with waypoints but without a verified flight.
         longest_s: Flight time of the UAS that lands last.
         peak_MB: Of memory, of the process.
-        flown: The flight, where it was flown.
+        flown: Summary of the flight, where it was flown.
     """
 
     scenario: str
@@ -68,7 +68,7 @@ class Measured:
     n_without: int
     longest_s: float
     peak_MB: float  # noqa: N815
-    flown: Row | None
+    flown: dict[str, Any] | None
 
 
 def town(n_uas: int, n_waypoints: int, seed: int, side_m: float | None = None) -> Scenario:
@@ -94,7 +94,7 @@ def measure(
     planner.reset(brief, 0)
     cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
     plan = planner.mission_plan
-    flown = fly(scenario, 0, "trajectory", options) if flies else None
+    flown = summary(rollout(scenario, load_planner("trajectory", options))) if flies else None
     longest = max((p.flight.steps for p in plan.planned.values()), default=0)
     return Measured(
         scenario.name,
@@ -124,8 +124,10 @@ def show(rows: list[Measured]) -> None:
         cells += [f"{row.longest_s:.0f} s", f"{row.peak_MB:.0f}"]
         one = row.flown
         if one is not None:
-            cells += ["yes" if one.accomplished else "no", f"{one.violations}, {one.breaches}"]
-            cells += [f"{one.energy_Wh:.1f}", *(f"{ms:.1f}" for ms in one.decision_ms)]
+            done = one["coverage"] == 1.0 and one["all_home"] and not one["violations"]
+            cells += ["yes" if done else "no", f"{len(one['violations'])}, {one['breaches']}"]
+            times = (1e3 * one["decision_processor_s"][name] for name in ("p50", "p95", "max"))
+            cells += [f"{one['energy_Wh']:.1f}", *(f"{ms:.1f}" for ms in times)]
         table.add_row(*cells)
     console.print(table)
 

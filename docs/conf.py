@@ -15,10 +15,13 @@ project = "uas-coverage-env"
 author = "The uas-coverage-env authors"
 release = version = version_of("uas-coverage-env")
 
-extensions = ["myst_parser", "repository_links", "mathml", "public_names"]
+extensions = ["myst_nb", "repository_links", "mathml", "public_names"]
 exclude_patterns = ["_build", "_extensions"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
+nb_execution_mode = "off"  # the published site runs the lessons: .github/workflows/docs.yml
+nb_execution_timeout = 3600
+nb_execution_raise_on_error = True
 nitpicky = True
 highlight_language = "text"
 

@@ -12,7 +12,7 @@ QUICK = {
     "autopilot/test_guidance.py": "",
     "autopilot/test_return_mode.py": "",
     "autopilot/test_safety_filter.py": "",
-    "baselines/test_by_legs.py": (
+    "planning/test_legs_flown.py": (
         "only test_waypoints_in_a_row_are_one_leg "
         "test_corners_cost_what_the_leg_model_loses_in_them_and_straight_on_costs_nothing"
     ),

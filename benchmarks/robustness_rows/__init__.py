@@ -10,6 +10,7 @@ from robustness_rows import (
     judge,
     kills,
     missions,
+    mutants,
     repeats,
     scores,
 )
@@ -30,6 +31,10 @@ ROWS: dict[str, Row] = {
         batteries.ROW,
         decisions.ROW,
         exported.ROW,
+        mutants.ROW,
     )
 }
 """By name, in the order in which they are made."""
+
+ON_DEMAND = (mutants.ROW.name,)
+"""Made only where they are asked for: they take hours."""

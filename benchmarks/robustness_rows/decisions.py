@@ -23,8 +23,7 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
     "trajectory": ({}, None),
     "learned-velocity": ({}, None),
     "learned-route": ({}, None),
-    "milp-mpc": ({"threads": "1", "time_limit_s": f"{LIMIT_S:g}"}, 12),
-    "milp-mpc-guided": ({"threads": "1", "time_limit_s": f"{LIMIT_S:g}"}, 12),
+    "milp-mpc": ({"threads": "1"}, 12),
 }
 """Planner -> options, and steps that are flown (None: the mission)."""
 
@@ -35,7 +34,6 @@ _MISSIONS = {
     "trajectory": (2, 30),
     "learned-route": (1, 30),
     "milp-mpc": (2, 30),
-    "milp-mpc-guided": (2, 30),
 }
 _OTHERS = (10, 400)
 

@@ -107,6 +107,6 @@ ROW = Row(
         f"from {FIRST_SEED} on: hulls (thin ones among them), upright cylinders and pairs of UAS, "
         f"{SEGMENTS:,} segments each, of no length up to 100 m"
     ),
-    "Whole flights: `benchmarks/missions.py` judges every flight of its own by both. The geofence, "
-    "whose distance counts at samples.",
+    "Whole flights: the option `--check` of `compare` has each judged by both. The "
+    "geofence, whose distance counts at samples.",
 )

@@ -53,7 +53,7 @@ class Row:
     """A row of the page.
 
     Attributes:
-        name: R1 to R12.
+        name: R1 to R13.
         title: What is tried.
         unit: What is counted, in the plural.
         claim: What a trial has to do, else it has failed.

@@ -10,7 +10,7 @@ from uas_coverage_env.cli import main, retired
 from uas_coverage_env.cli.retired import FOLLOWERS
 
 ROOT = Path(__file__).parents[2]
-PLACES = ("uas_coverage_env", "baselines", "agents", "benchmarks", "docs", "notebooks", ".ci")
+PLACES = ("uas_coverage_env", "baselines", "agents", "benchmarks", "docs", ".ci")
 READ = {".md", ".py", ".toml", ".ipynb", ".yml", ".sh", ".ts", ""}
 
 

@@ -69,7 +69,7 @@ def notebook_code(path: Path):
 
 def test_what_pages_and_lessons_import_is_described(described):
     code = [b.text for page in PAGES for b in blocks(page) if b.language == "python"]
-    for path in (ROOT / "notebooks").glob("*.ipynb"):
+    for path in (ROOT / "docs" / "lessons").glob("*.ipynb"):
         code += notebook_code(path)
     used = set().union(*map(imports, code))
     assert len(used) > 30

@@ -1,4 +1,4 @@
-"""The lessons in notebooks/: they run from top to bottom, and are kept without what they print."""
+"""The lessons in docs/lessons run from top to bottom, and are kept without what they print."""
 
 import ast
 import re
@@ -12,7 +12,7 @@ from nbclient import NotebookClient
 
 from uas_coverage_env.compiled.progress import NOTICE
 
-NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+NOTEBOOKS = sorted((ROOT / "docs" / "lessons").glob("*.ipynb"))
 SECONDS_FOR_A_CELL = 600  # the longest takes half a minute; a busy machine several times that
 MACHINE_PATH = re.compile(r"/(?:home|Users|private|var)/|\b[A-Z]:\\")
 INLINE = "%matplotlib inline\n"
@@ -59,9 +59,8 @@ def cut_short(notebook, name):
 
 def test_there_are_nine_lessons_and_pages_lead_to_them():
     assert "".join(path.name[0] for path in NOTEBOOKS) == "123456789"
-    for page in (ROOT / "docs" / "notebooks.md", ROOT / "notebooks" / "README.md"):
-        text = page.read_text(encoding="utf-8")
-        assert all(f"{path.name})" in text for path in NOTEBOOKS), page
+    text = (ROOT / "docs" / "notebooks.md").read_text(encoding="utf-8")
+    assert all(f"(lessons/{path.name})" in text for path in NOTEBOOKS)
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name_of)

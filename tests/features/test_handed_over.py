@@ -6,7 +6,6 @@ from eventful import WAYPOINTS, event, field
 from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.velocity.planner import LearnedVelocity
 from uas_coverage_baselines.milp_mpc import MilpMpc
-from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
@@ -14,11 +13,11 @@ from uas_coverage_baselines.trajectory import Trajectory
 from uas_coverage_env import rollout
 from uas_coverage_env.flight.metrics import accomplished
 
-QUICK = {"deterministic": True, "at_once": 1, "horizon": 8, "threads": 1, "teams": 2}
+QUICK = {"at_once": 1, "horizon": 8, "threads": 1, "teams": 2}
 
 
-def milp(planner):
-    return lambda: planner(planner.Options(**QUICK))
+def milp(order):
+    return lambda: MilpMpc(MilpMpc.Options(**QUICK, order=order))
 
 
 PLANNERS = {
@@ -27,8 +26,8 @@ PLANNERS = {
     "trajectory": lambda: Trajectory(Trajectory.Options(orders=1, moves=20_000, programs=20)),
     "learned-route": lambda: LearnedRoute(LearnedRoute.Options(samples=4)),
     "learned-velocity": LearnedVelocity,
-    "milp-mpc": milp(MilpMpc),
-    "milp-mpc-guided": milp(MilpMpcGuided),
+    "milp-mpc": milp("none"),
+    "milp-mpc along an order": milp("search"),
 }
 
 CORNERS = tuple(WAYPOINTS[i] for i in (0, 2, 6, 8))  # enough where a decision takes long

@@ -17,8 +17,8 @@ from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.flight.record import MODES
 from uas_coverage_env.mission import first_sight
-from uas_coverage_env.mission.handover import SILENT_S
-from uas_coverage_env.mission.relaunch import Relaunch
+from uas_coverage_env.planning.around.handover import SILENT_S
+from uas_coverage_env.planning.around.relaunch import Relaunch
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.uas_coverage_v0 import parallel_env
 from uas_coverage_env.vehicle.layout import DOD

@@ -13,7 +13,7 @@ from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle.layout import LIFT, TAU_X, TAU_Y, TAU_Z
 from uas_coverage_env.world import Wrench
 
-LITTLE = Effort(deterministic=True, teams=4)
+LITTLE = Effort(teams=4)
 
 
 def corners(low, high):
@@ -70,7 +70,7 @@ def with_uas(scenario, row, **fields):
 
 def planner(scenario, **options):
     """A planner that works by nodes, on a short horizon, ready for the mission."""
-    made = MilpMpc(MilpMpcOptions(**({"deterministic": True, "horizon": 8, "teams": 1} | options)))
+    made = MilpMpc(MilpMpcOptions(**({"horizon": 8, "teams": 1} | options)))
     made.reset(MissionBrief.of(scenario), 0)
     return made
 

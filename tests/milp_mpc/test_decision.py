@@ -2,10 +2,11 @@
 
 import dataclasses
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from toy_problems import S500, box, flight, flown, planned, state, toy
+from toy_problems import S500, box, flight, flown, objective_of, planned, state, toy
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
@@ -24,9 +25,9 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 from uas_coverage_env.geometry import sphere_faces
 from uas_coverage_env.vehicle.layout import PHI, THETA, VX, WY
 
-BY_NODES = Effort(deterministic=True, teams=4)
+BY_NODES = Effort(teams=4)
 BY_TEAM = dataclasses.replace(BY_NODES, joint=None)
-WITH_TIME = Effort(time_limit_s=60.0, teams=4)  # all of it is needed only on a very busy machine
+THOROUGH = Effort(work=20.0, teams=4)
 OPTIMAL = SolverLimits(relative_gap=1e-6, absolute_gap=1e-5)
 
 
@@ -66,22 +67,6 @@ def best(problem):
     return solution
 
 
-def objective_of(problem, plan):
-    """The objective of a plan's states, inputs and coverage, by the whole OCP; inf if refused."""
-    milp, v = formulate(problem)
-    built = milp.build()
-    lower, upper = built.lower.copy(), built.upper.copy()
-    covers = plan.covers[:, :, problem.waypoint_index].astype(float)
-    for columns, values, room in (
-        (v.x[:, 1:], plan.x[:, 1:], 1e-7),
-        (v.u, plan.u, 1e-7),
-        (v.covers[v.covers >= 0], covers[v.covers >= 0], 0.0),
-    ):
-        lower[columns], upper[columns] = values - room, values + room
-    assert not covers[v.covers < 0].any()
-    return solve(built, OPTIMAL, lower=lower, upper=upper).objective
-
-
 def test_a_team_of_plans_is_a_point_of_the_whole_program_with_the_objective_it_says(
     problem, by_nodes
 ):
@@ -95,12 +80,12 @@ def test_a_waypoint_is_covered_once_by_a_team(by_nodes):
 
 
 def test_no_decision_is_better_than_the_best_one_and_no_bound_above_it(problem, by_nodes, best):
-    with_time = planned(decide(problem, None, 1.0, WITH_TIME))
+    thorough = planned(decide(problem, None, 1.0, THOROUGH))
     assert by_nodes.objective >= best.objective - 1e-3
-    assert best.objective - 1e-3 <= with_time.objective <= by_nodes.objective + 1e-3
-    assert with_time.bound <= best.objective + 1e-3
+    assert best.objective - 1e-3 <= thorough.objective <= by_nodes.objective + 1e-3
+    assert thorough.bound <= best.objective + 1e-3
     assert by_nodes.bound <= best.objective + 1e-3
-    assert first_trouble(problem, with_time) is None
+    assert first_trouble(problem, thorough) is None
 
 
 def test_a_deterministic_decision_has_the_bound_of_the_joint_program(problem, by_nodes, best):
@@ -111,11 +96,11 @@ def test_a_deterministic_decision_has_the_bound_of_the_joint_program(problem, by
     assert by_nodes.objective <= without.objective + 1e-6
 
 
-def test_no_gap_is_told_where_the_joint_program_was_not_solved(problem, monkeypatch):
+def test_no_gap_is_told_where_the_joint_program_was_not_solved(problem):
     waiting = dataclasses.replace(BY_NODES, at_once=1)
     assert planned(decide(problem, None, 1.0, waiting)).relative_gap() is None
-    monkeypatch.setattr(team_search, "_JOINT_WHOLE", 10)
-    assert planned(decide(problem, None, 1.0, BY_NODES)).relative_gap() is None
+    little = dataclasses.replace(BY_NODES, work=0.05)
+    assert planned(decide(problem, None, 1.0, little)).relative_gap() is None
 
 
 def test_the_joint_program_is_written_in_the_tightest_form(problem, monkeypatch):
@@ -131,20 +116,53 @@ def test_the_joint_program_is_written_in_the_tightest_form(problem, monkeypatch)
     assert first == [(1, None), (1, None), (2, "clique")]
 
 
-def test_a_share_of_the_time_is_the_joint_programs_once_each_uas_has_a_plan(problem, by_nodes):
-    search = team_search.TeamSearch(problem, WITH_TIME, time.perf_counter())
-    search.prepare(range(2))
+def test_a_share_of_the_work_is_the_joint_programs_once_each_uas_has_a_plan(
+    problem, by_nodes, monkeypatch
+):
+    refined = []
+    monkeypatch.setattr(team_search.TeamSearch, "_refined", lambda *task: refined.append(task[1]))
+    search = team_search.TeamSearch(problem, BY_NODES, time.perf_counter())
     alone = {key: getattr(by_nodes, key)[:1] for key in ("x", "u", "covers")}
     search.collect(0, [dataclasses.replace(by_nodes, names=by_nodes.names[:1], **alone)])
-    assert not search.joint_is_due(0), "there is time enough"
-    search._began -= 0.6 * WITH_TIME.time_limit_s
-    assert search.joint_is_due(0)
-    assert not search.joint_is_due(1), "it has no plan yet"
+    with ThreadPoolExecutor(1) as one:
+        for work in (0.6, 0.8, 2.5):
+            search._joint, search.work = 0.3, work
+            search.refine([(0, None), (1, None)], NARROW, one)
+            refined.append("next")
+    assert refined == [0, 1, "next", 1, "next", "next"]
 
 
-def test_one_uas_with_time_gets_its_best_plan():
+def test_the_work_of_a_decision_is_that_of_its_programs_whatever_is_solved_beside(problem):
+    spent = []
+    for threads in (1, 3):
+        search = team_search.TeamSearch(problem, BY_NODES, time.perf_counter())
+        search.prepare(range(2))
+        tasks = [(uas, one) for uas in range(2) for one in construct(problem, uas, 1.0)[:3]]
+        with ThreadPoolExecutor(threads) as side_by_side:
+            search.refine(tasks, NARROW, side_by_side)
+        spent.append(search.work)
+    assert spent[0] == spent[1] > 0.0
+
+
+def test_with_less_work_fewer_programs_are_solved_and_each_uas_has_a_plan(problem, monkeypatch):
+    counted = []
+    refined = team_search.TeamSearch._refined
+
+    def counting(search, *task):
+        counted.append(search.effort.work)
+        return refined(search, *task)
+
+    monkeypatch.setattr(team_search.TeamSearch, "_refined", counting)
+    little = dataclasses.replace(BY_NODES, work=1e-3)
+    for effort in (little, BY_NODES):
+        plan = planned(decide(problem, None, 1.0, effort))
+        assert set(plan.renewed) == set(problem.names)
+    assert counted.count(little.work) < counted.count(BY_NODES.work)
+
+
+def test_one_uas_with_work_enough_gets_its_best_plan():
     problem = two_around_a_tower(n_uas=1)
-    plan = planned(decide(problem, None, 1.0, WITH_TIME))
+    plan = planned(decide(problem, None, 1.0, THOROUGH))
     best = solve(formulate(problem)[0].build(), OPTIMAL)
     assert plan.objective == pytest.approx(best.objective, abs=0.02)
     assert plan.relative_gap() < 0.01
@@ -155,7 +173,7 @@ def test_a_decision_that_cannot_be_made_says_that_there_is_no_plan():
     wall = box((75.0, 0.0, -49.0), (120.0, 200.0, 0.0))
     problem = toy(start, horizon=6, obstacles=[wall])
     assert decide(problem, None, 1.0, BY_NODES) is Reason.NO_PLAN
-    assert decide(problem, None, 1.0, WITH_TIME) is Reason.NO_PLAN
+    assert decide(problem, None, 1.0, THOROUGH) is Reason.NO_PLAN
 
 
 def test_a_plan_is_found_by_nodes_even_where_every_flight_to_a_waypoint_is_blocked():
@@ -195,12 +213,12 @@ def test_a_decision_whose_time_is_over_when_it_begins_says_so(problem):
 @pytest.fixture
 def nothing_for_b(monkeypatch):
     """No program gives the second UAS a plan."""
-    refined = team_search.TeamSearch.refined
+    refined = team_search.TeamSearch._refined
 
     def for_a_alone(search, uas, *rest):
         return refined(search, uas, *rest) if uas == 0 else None
 
-    monkeypatch.setattr(team_search.TeamSearch, "refined", for_a_alone)
+    monkeypatch.setattr(team_search.TeamSearch, "_refined", for_a_alone)
 
 
 def test_a_uas_that_gets_no_plan_brakes_and_the_others_fly_on(problem, nothing_for_b):
@@ -285,7 +303,7 @@ def test_what_is_left_of_the_last_plan_can_be_flown_on(problem, by_nodes):
         ],
         targets=problem.targets,
     )
-    plan = planned(decide(moved, by_nodes.advanced(), 1.0, Effort(deterministic=True, teams=1)))
+    plan = planned(decide(moved, by_nodes.advanced(), 1.0, Effort(teams=1)))
     assert first_trouble(moved, plan) is None
     # what was planned is planned still, and one step more of the horizon is gained
     assert plan.covers.any(axis=(0, 1)).sum() >= by_nodes.advanced().covers.any(axis=(0, 1)).sum()

@@ -79,7 +79,7 @@ def lively(setting_off_s):
 
 
 def breaches(scenario, **options):
-    options = {"horizon": 8, "teams": 1, "deterministic": True} | options
+    options = {"horizon": 8, "teams": 1} | options
     return rollout(scenario, MilpMpc(MilpMpcOptions(**options)), max_steps=45)
 
 

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_problems import S500, box, flown, moving, state, toy
-from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, backup_trajectory
+from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
+from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.layout import DOD, PHI, THETA, VX, VZ, WX, WZ
 

@@ -175,7 +175,7 @@ class AlwaysNorth(RoughDecisions):
 def test_a_planner_without_time_still_commands_every_uas(limit_s):
     scenario = load_scenario("village")
     world = World(scenario)
-    made = planner(scenario, deterministic=False, time_limit_s=limit_s)
+    made = planner(scenario, time_limit_s=limit_s)
     for _ in range(3):
         commands = made.act(world.swarm_state())
         assert set(commands) == set(world.active)

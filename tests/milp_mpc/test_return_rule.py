@@ -99,7 +99,7 @@ def test_a_uas_returns_when_and_only_when_all_that_is_open_is_beyond(places):
 
 
 def flown(scenario):
-    return rollout(scenario, load_planner("milp-mpc", {"deterministic": True, "horizon": 10}))
+    return rollout(scenario, load_planner("milp-mpc", {"horizon": 10}))
 
 
 SMALL_AREA = {

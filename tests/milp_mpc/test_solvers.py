@@ -251,7 +251,7 @@ def test_rows_without_columns_count(solve):
 
 def test_a_decision_is_made_with_every_solver(name):
     problem = turn(8)
-    plan = planned(decide(problem, None, 1.0, Effort(deterministic=True, teams=2, solver=name)))
+    plan = planned(decide(problem, None, 1.0, Effort(teams=2, solver=name)))
     assert first_trouble(problem, plan) is None
     assert plan.covers.any()
 

@@ -96,9 +96,7 @@ def test_without_stated_bounds_the_program_is_the_same():
 )
 def test_in_wind_the_planner_commands_what_it_is_asked_to(in_wind, kind):
     brief = MissionBrief.of(with_disturbances(TOWN, "moderate", 0))
-    options = MilpMpcOptions(
-        horizon=8, in_wind=in_wind, deterministic=True, at_once=1, threads=1, time_limit_s=0.25
-    )
+    options = MilpMpcOptions(horizon=8, in_wind=in_wind, at_once=1, threads=1, time_limit_s=0.25)
     planner = MilpMpc(options)
     planner.reset(brief, 0)
     swarm = first_sight(brief)

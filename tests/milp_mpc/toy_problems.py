@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
-from uas_coverage_baselines.milp_mpc.model.ocp import shared_variables
+from uas_coverage_baselines.milp_mpc.model.ocp import OCP, formulate, shared_variables
 from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
@@ -127,6 +127,22 @@ def flown(vehicle, x0, commands, dt_s=1.0):
 def flight(vehicle, x0, commands, dt_s=1.0):
     """(T+1, 14) states of such a flight."""
     return flown(vehicle, x0, commands, dt_s)[0]
+
+
+def objective_of(problem, plan, blocks=OCP):
+    """The objective of a plan's states, inputs and coverage, by the whole OCP; inf if refused."""
+    milp, v = formulate(problem, blocks)
+    built = milp.build()
+    lower, upper = built.lower.copy(), built.upper.copy()
+    covers = plan.covers[:, :, problem.waypoint_index].astype(float)
+    for columns, values, room in (
+        (v.x[:, 1:], plan.x[:, 1:], 1e-7),
+        (v.u, plan.u, 1e-7),
+        (v.covers[v.covers >= 0], covers[v.covers >= 0], 0.0),
+    ):
+        lower[columns], upper[columns] = values - room, values + room
+    assert not covers[v.covers < 0].any()
+    return solve(built, TO_OPTIMALITY, lower=lower, upper=upper).objective
 
 
 def planned(outcome) -> Plan:

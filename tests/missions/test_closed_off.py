@@ -6,14 +6,13 @@ from small_worlds import meadow, waypoint
 
 from uas_coverage_env.flight import Why, load_planner, rollout
 
-LITTLE_MILP = {"deterministic": True, "horizon": 10, "threads": 1, "teams": 2, "at_once": 1}
+LITTLE_MILP = {"horizon": 10, "threads": 1, "teams": 2, "at_once": 1}
 PLANNERS = {
     "nearest-waypoint": {},
     "lawnmower": {},
     "trajectory": {"orders": 1, "moves": 20_000, "programs": 40, "idle_work": 0},
     "tour": {"moves": 20_000, "changes": 50},
     "milp-mpc": LITTLE_MILP,
-    "milp-mpc-guided": LITTLE_MILP,
     "learned-route": {"samples": 4, "changes": 1000, "rehearsed": 1},
     "learned-velocity": {},
 }

@@ -7,7 +7,7 @@ from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 
 from uas_coverage_env import generate_scenario, independent_check, load_planner, rollout
 
-QUICK = {"deterministic": "true", "horizon": "8", "teams": "1", "threads": "1"}
+QUICK = {"horizon": "8", "teams": "1", "threads": "1"}
 SAFE_M = 4.0 + 3.0 + 0.36  # the balloon's radius, its safe distance, the UAS's radius
 
 

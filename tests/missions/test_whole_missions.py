@@ -19,7 +19,7 @@ from uas_coverage_env.cli import main
 
 PER_SEGMENT = 20
 IN_TURNS = {
-    "deterministic": "true", "at_once": "1", "horizon": "12", "teams": "2", "threads": "1",
+    "at_once": "1", "horizon": "12", "teams": "2", "threads": "1",
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from uas_coverage_env import Flight
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.scenario.families.flood_village import flood_village
 
-SOON = {"horizon": 8, "teams": 1, "deterministic": True, "threads": 1, "return_rule": "vehicle"}
+SOON = {"horizon": 8, "teams": 1, "threads": 1, "return_rule": "vehicle"}
 
 
 @pytest.fixture(autouse=True)

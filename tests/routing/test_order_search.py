@@ -1,7 +1,6 @@
 """The order search: what an order must keep, and the optimum where it can be enumerated."""
 
 import math
-from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -11,17 +10,20 @@ from hypothesis import strategies as st
 
 from uas_coverage_env.planning.routing import (
     Routes,
-    RoutingTask,
+    RoutingProblem,
     SearchEffort,
     annealing,
     empty_routes,
     improve_routes,
 )
 from uas_coverage_env.planning.routing import search as search_module
+from uas_coverage_env.planning.routing.clock import CUTTING
+from uas_coverage_env.planning.routing.problem import ROUTED_UAS_DTYPE
 from uas_coverage_env.planning.routing.search import OrderSearch
 from uas_coverage_env.planning.routing.window import RouteWindow
 
 SOME = SearchEffort(20_000)
+TURNED_DEG, COST = [0.0, 45.0, 90.0, 135.0, 180.0], [0.0, -0.3, -0.45, 0.1, 1.5]
 seeds = st.integers(0, 10_000)
 few = settings(max_examples=15, deadline=None, derandomize=True)
 
@@ -33,60 +35,62 @@ def task(seed=0, waypoints=8, uas=2, **changes):
     here, start = rng.uniform(0.0, 300.0, (2, uas, 2))
     speed = np.array([12.0, 9.0, 10.0])[:uas]
     apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
-    made = RoutingTask(
+    records = np.zeros(uas, ROUTED_UAS_DTYPE)
+    records["kind"] = records["flown_by"] = np.arange(uas)
+    records["position_m"], records["start_m"] = here, start
+    records["velocity_mps"] = rng.uniform(-5.0, 5.0, (uas, 2))
+    records["speed_mps"], records["acceleration_mps2"] = speed, 3.0
+    records["idle_s"] = np.linalg.norm(here - start, axis=1) / speed
+    records["budget_s"] = 1000.0
+    made = RoutingProblem(
         open_waypoints=np.arange(waypoints),
+        uas=records,
         first_s=np.linalg.norm(here[:, None] - places[None, :, :2], axis=2) / speed[:, None],
         between_s=apart[None] / speed[:, None, None],
-        kind=np.arange(uas),
         home_s=np.linalg.norm(start[:, None] - places[None, :, :2], axis=2) / speed[:, None] + 4.0,
-        idle_s=np.linalg.norm(here - start, axis=1) / speed,
-        position_m=here,
-        velocity_mps=rng.uniform(-5.0, 5.0, (uas, 2)),
-        speed_mps=speed,
-        acceleration_mps2=np.full(uas, 3.0),
-        start_m=start,
-        waypoints_m=places,
         turn_s=15.0 / speed[:, None] * np.ones(waypoints),
+        turn_of_cosine=CUTTING,
+        waypoints_m=places,
         neighbours=np.argsort(apart, axis=1, kind="stable")[:, 1:],
         weight=np.ones(waypoints),
-        not_before_s=np.zeros(waypoints),
-        budget_s=np.full(uas, 1000.0),
+        release_s=np.zeros(waypoints),
+        forbidden=np.zeros((uas, waypoints), bool),
     )
-    return replace(made, **changes)
+    return made.replace(**changes)
 
 
 def turn(a, b, c):
-    """Cost in radii of turning at b, by the search's own table."""
+    """Cost in radii of turning at b, as the docs say."""
     inward, onward = np.subtract(b, a), np.subtract(c, b)
     length = math.hypot(*inward) * math.hypot(*onward)
     if length < 1e-9:
         return 0.0
     angle = math.degrees(math.acos(max(-1.0, min(1.0, float(inward @ onward) / length))))
-    return float(np.interp(angle, search_module._TURN_DEG, search_module._TURN_RADII))
+    return float(np.interp(angle, TURNED_DEG, COST))
 
 
 def seconds_of(task, u, route):
     """Flight time of a route, as the docstrings say, in plain Python."""
     if not len(route):
-        return float(task.idle_s[u])
-    places = [task.position_m[u], *task.waypoints_m[list(route), :2], task.start_m[u]]
+        return float(task.uas["idle_s"][u])
+    places = [task.uas["position_m"][u], *task.waypoints_m[list(route), :2], task.uas["start_m"][u]]
     towards = places[1] - places[0]
-    wanted = task.speed_mps[u] * towards / math.hypot(*towards)
-    lost = task.velocity_mps[u] - wanted
+    wanted = task.uas["speed_mps"][u] * towards / math.hypot(*towards)
+    lost = task.uas["velocity_mps"][u] - wanted
     time = float(task.first_s[u, route[0]])
-    time += float(lost @ lost) / (2.0 * task.acceleration_mps2[u] * task.speed_mps[u])
-    time = max(time, task.not_before_s[route[0]])
+    time += float(lost @ lost) / (2.0 * task.uas["acceleration_mps2"][u] * task.uas["speed_mps"][u])
+    time = max(time, task.release_s[route[0]])
     for k, w in enumerate(route):
         time += task.turn_s[u, w] * turn(*places[k : k + 3])
         if k + 1 < len(route):
-            time += task.between_s[task.kind[u], w, route[k + 1]]
-            time = max(time, task.not_before_s[route[k + 1]])
+            time += task.between_s[task.uas["kind"][u], w, route[k + 1]]
+            time = max(time, task.release_s[route[k + 1]])
     return float(time + task.home_s[u, route[-1]])
 
 
 def cost_of(task, seconds, left_out, total_weight):
     """What the search minimises, from the seconds of all UAS."""
-    overtime = sum(max(s - b, 0.0) for s, b in zip(seconds, task.budget_s, strict=True))
+    overtime = sum(max(s - b, 0.0) for s, b in zip(seconds, task.uas["budget_s"], strict=True))
     left_s = search_module._left_out_s(task, total_weight)[list(left_out)].sum()
     return max(0.0, *seconds) + total_weight * sum(seconds) + annealing.OVERTIME * overtime + left_s
 
@@ -148,7 +152,7 @@ def test_the_same_arguments_give_the_same_order(seed):
 @given(seeds, st.integers(1, 3))
 def test_seconds_and_cost_are_those_of_the_routes(seed, uas):
     opens = np.where(np.arange(8) % 3 == 0, 40.0, 0.0)
-    problem = task(seed, 8, uas, not_before_s=opens)
+    problem = task(seed, 8, uas, release_s=opens)
     found = improve_routes(problem, empty_routes(uas), SearchEffort(2000), seed)
     alone = [seconds_of(problem, u, route) for u, route in enumerate(found.routes)]
     assert found.seconds == pytest.approx(alone, abs=0.2)  # turns are tabulated
@@ -160,10 +164,10 @@ def test_seconds_and_cost_are_those_of_the_routes(seed, uas):
 @few
 @given(seeds, st.integers(1, 3), st.booleans(), st.booleans())
 def test_judged_by_pieces_routes_cost_what_they_cost_as_a_whole(seed, uas, alike, late):
-    made = task(seed, 12, uas, not_before_s=np.where(np.arange(12) % 5 == 0, 40.0 * late, 0.0))
+    made = task(seed, 12, uas, release_s=np.where(np.arange(12) % 5 == 0, 40.0 * late, 0.0))
     if alike:  # stretches change hands
         same = {"kind": np.zeros(uas, np.int64), "turn_s": np.ones((uas, 12))}
-        made = replace(made, **same, between_s=made.between_s * np.linspace(0.8, 1.2, 12))
+        made = made.replace(**same, between_s=made.between_s * np.linspace(0.8, 1.2, 12))
     found = improve_routes(made, empty_routes(uas), SearchEffort(4000, by_pieces=True), seed)
     again = improve_routes(made, found, SearchEffort(0), 0)
     assert visits(found) == list(range(12))
@@ -206,18 +210,18 @@ def test_waypoints_are_left_out_rather_than_a_battery_emptied(seed, budget_s):
     # so little overtime is cheaper than a waypoint; the guide's reserve is far more
     dearest_s = search_module._left_out_s(problem, SOME.total_weight).max()
     slight_s = dearest_s / annealing.OVERTIME
-    assert (found.seconds <= problem.budget_s + slight_s).all()
+    assert (found.seconds <= problem.uas["budget_s"] + slight_s).all()
     assert len(found.left_out)
 
 
 def test_a_waypoint_far_from_everything_is_flown_to_as_long_as_a_battery_lasts():
     alone = task(7, 1, 1)
-    far = replace(alone, first_s=np.full((1, 1), 200.0), home_s=np.full((1, 1), 200.0))
-    late = replace(alone, not_before_s=np.array([500.0]))
+    far = alone.replace(first_s=np.full((1, 1), 200.0), home_s=np.full((1, 1), 200.0))
+    late = alone.replace(release_s=np.array([500.0]))
     for problem in (far, late):
-        enough = replace(problem, budget_s=np.array([1000.0]))
+        enough = problem.replace(budget_s=np.array([1000.0]))
         assert not len(improve_routes(enough, empty_routes(1), SOME, 0).left_out)
-    small = replace(far, budget_s=np.array([300.0]))
+    small = far.replace(budget_s=np.array([300.0]))
     assert len(improve_routes(small, empty_routes(1), SOME, 0).left_out)
 
 
@@ -232,7 +236,7 @@ def test_a_lost_uass_waypoints_go_to_the_others():
     problem = task(3, 10)
     before = improve_routes(problem, empty_routes(2), SOME, 0)
     assert len(before.routes[1])
-    lost = replace(problem, budget_s=np.array([1000.0, -np.inf]), idle_s=np.zeros(2))
+    lost = problem.replace(budget_s=np.array([1000.0, -np.inf]), idle_s=np.zeros(2))
     after = improve_routes(lost, before, SOME, 0)
     assert sorted(after.routes[0]) == list(range(10))
 
@@ -253,19 +257,19 @@ def test_a_search_in_parts_finds_what_it_finds_at_once(parts):
 def test_a_waypoint_that_opens_late_is_waited_for():
     problem = task(4, 1, 1)
     opens = 40.0
-    late = replace(problem, not_before_s=np.array([opens]))
+    late = problem.replace(release_s=np.array([opens]))
     found = improve_routes(late, empty_routes(1), SearchEffort(100), 0)
     back = late.home_s[0, 0] + late.turn_s[0, 0] * turn(
-        late.position_m[0], late.waypoints_m[0, :2], late.start_m[0]
+        late.uas["position_m"][0], late.waypoints_m[0, :2], late.uas["start_m"][0]
     )
     assert found.seconds[0] == pytest.approx(opens + back, abs=0.2)
 
 
 def test_visited_waypoints_vanish_and_new_ones_are_inserted():
     problem = task(5, 10)
-    before = improve_routes(replace(problem, open_waypoints=np.arange(8)), empty_routes(2), SOME, 0)
+    before = improve_routes(problem.replace(open_waypoints=np.arange(8)), empty_routes(2), SOME, 0)
     now = np.array([1, 2, 4, 5, 7, 8, 9])
-    after = improve_routes(replace(problem, open_waypoints=now), before, SearchEffort(0), 0)
+    after = improve_routes(problem.replace(open_waypoints=now), before, SearchEffort(0), 0)
     assert visits(after) == now.tolist()
     for old, new in zip(before.routes, after.routes, strict=True):
         assert [w for w in old if w in now] == [w for w in new if w < 8]
@@ -275,7 +279,7 @@ def test_with_nothing_open_every_uas_goes_home():
     problem = task(6, 5, open_waypoints=np.zeros(0, np.int64))
     found = improve_routes(problem, improve_routes(task(6, 5), empty_routes(2), SOME, 0), SOME, 0)
     assert visits(found) == []
-    assert found.seconds == pytest.approx(problem.idle_s)
+    assert found.seconds == pytest.approx(problem.uas["idle_s"])
 
 
 def test_one_waypoint_alone_goes_to_some_uas():
@@ -291,10 +295,10 @@ def test_searching_the_beginnings_is_searching_the_whole_with_the_rests_as_they_
     whole = task(seed, waypoints=14, turn_s=np.zeros((2, 14)))
     order = improve_routes(whole, empty_routes(2), SearchEffort(200), seed)
     part = RouteWindow.of(whole, order, most)
-    as_it_is = improve_routes(part.task, part.order, SearchEffort(0), 0)
+    as_it_is = improve_routes(part.problem, part.order, SearchEffort(0), 0)
     assert as_it_is.seconds == pytest.approx(order.seconds)
     assert as_it_is.cost_s == pytest.approx(order.cost_s)
-    better = improve_routes(part.task, as_it_is, SOME, seed)
+    better = improve_routes(part.problem, as_it_is, SOME, seed)
     joined = part.joined(better)
     assert sorted(np.concatenate(joined.routes)) == list(range(14))
     if all(map(len, better.routes)):  # setting off for the rest at once is not in `idle_s`
@@ -313,7 +317,7 @@ def test_what_no_battery_reaches_stays_left_out_when_beginnings_are_searched():
     part = RouteWindow.of(whole, order, 2)
     assert len(order.left_out)
     assert any(map(len, part.rests))
-    joined = part.joined(improve_routes(part.task, part.order, SOME, 1))
+    joined = part.joined(improve_routes(part.problem, part.order, SOME, 1))
     assert sorted(np.concatenate([*joined.routes, joined.left_out])) == list(range(14))
 
 
@@ -321,19 +325,19 @@ def test_short_routes_are_searched_as_a_whole():
     whole = task(3)
     order = improve_routes(whole, empty_routes(2), SOME, 0)
     part = RouteWindow.of(whole, order, 8)
-    assert part.task is whole
+    assert part.problem is whole
     assert [r.tolist() for r in part.joined(order).routes] == [r.tolist() for r in order.routes]
 
 
 @few
 @given(seeds, st.booleans())
 def test_no_uas_is_sent_where_it_must_not_go(seed, by_pieces):
-    barred = np.zeros((2, 12), bool)
-    barred[0, :4] = barred[1, 3:6] = True
-    problem = task(seed, 12, barred=barred)
+    forbidden = np.zeros((2, 12), bool)
+    forbidden[0, :4] = forbidden[1, 3:6] = True
+    problem = task(seed, 12, forbidden=forbidden)
     nothing = np.zeros(0, np.int64)
     against = Routes((np.arange(12), nothing), nothing, np.zeros(2), np.inf)
     found = improve_routes(problem, against, SearchEffort(4000, by_pieces=by_pieces), seed)
     for u, route in enumerate(found.routes):
-        assert not barred[u, route].any()
+        assert not forbidden[u, route].any()
     assert found.left_out.tolist() == [3], "no UAS may go there"

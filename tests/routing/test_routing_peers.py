@@ -1,7 +1,6 @@
 """The benchmark beside routing libraries: what they are given is what our search is given."""
 
 import sys
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,13 +13,13 @@ import routing_peers
 
 @pytest.mark.parametrize(("uas", "waypoints"), [(1, 12), (2, 10)])
 def test_along_the_arcs_of_the_libraries_our_orders_cost_what_our_search_says(uas, waypoints):
-    task = routing_peers.task_of(uas, waypoints, 1)
-    task = replace(task, turn_s=np.zeros_like(task.turn_s))
-    found = routing_peers.own(task, 0.6, 0.01, 0)
+    problem = routing_peers.problem_of(uas, waypoints, 1)
+    problem = problem.replace(turn_s=np.zeros_like(problem.turn_s))
+    found = routing_peers.own(problem, 0.6, 0.01, 0)
     seconds = []
     for u, route in enumerate(found.routes):
         places = [waypoints + u, *route, waypoints + u] if route else []
-        arcs_s = routing_peers._arcs_s(task, u)
+        arcs_s = routing_peers._arcs_s(problem, u)
         seconds.append(sum(arcs_s[a, b] for a, b in pairwise(places)))
     assert sorted(w for route in found.routes for w in route) == list(range(waypoints))
     cost = max(seconds) + 0.6 * sum(seconds)
@@ -28,7 +27,7 @@ def test_along_the_arcs_of_the_libraries_our_orders_cost_what_our_search_says(ua
 
 
 def test_more_waypoints_than_a_battery_lasts_for_are_a_problem_all_the_same():
-    task = routing_peers.task_of(1, 60, 1)
-    assert task.n_uas == 1
-    assert task.n_waypoints == 60
-    assert task.first_s.shape == (1, 60)
+    problem = routing_peers.problem_of(1, 60, 1)
+    assert problem.n_uas == 1
+    assert problem.n_waypoints == 60
+    assert problem.first_s.shape == (1, 60)

@@ -1,7 +1,5 @@
 """Orders with fresh packs: what is visited now, what later, and when the mission is over."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,11 +19,10 @@ def at_home(seed, waypoints, uas, budget_s):
     """The problem of UAS at home, at rest, each of which lasts for so long."""
     made = task(seed, waypoints, uas)
     first_s = made.home_s - 4.0  # of landing
-    return replace(
-        made,
+    return made.replace(
         first_s=first_s,
         idle_s=np.zeros(uas),
-        position_m=made.start_m,
+        position_m=made.uas["start_m"],
         velocity_mps=np.zeros((uas, 2)),
         budget_s=np.full(uas, float(budget_s)),
     )
@@ -35,7 +32,7 @@ def packs(home, left, **changes):
     n_uas = home.n_uas
     swap_s = np.full(n_uas, SWAP_S)
     known = {"left": np.full(n_uas, left), "ground_s": swap_s, "swap_s": swap_s, "until_s": 1e4}
-    return FreshPacks(task=lambda: home, **(known | changes))
+    return FreshPacks(problem=lambda: home, **(known | changes))
 
 
 def found(home, fresh, effort=SOME, seed=0):
@@ -92,8 +89,7 @@ def two_fields(budget_s):
     places = np.array([(x, y, -20.0) for x in (-120.0, 120.0) for y in (-20.0, 0.0, 20.0)])
     away = np.linalg.norm(places[:, :2], axis=1)
     apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
-    return replace(
-        home,
+    return home.replace(
         waypoints_m=places,
         first_s=away[None] / 10.0,
         home_s=away[None] / 10.0 + 4.0,
@@ -115,7 +111,7 @@ def test_a_charge_is_for_one_of_two_fields_where_it_does_not_last_for_both():
 
 def test_a_uas_on_the_ground_is_planned_for_from_when_it_is_ready():
     home = two_fields(45.0)
-    on_ground = replace(home, budget_s=np.full(1, -np.inf))
+    on_ground = home.replace(budget_s=np.full(1, -np.inf))
     fresh = packs(home, 2, ground_s=np.array([25.0]))
     order = improve_trips(on_ground, empty_routes(1), SOME, 0, fresh)
     assert not len(order.routes[0])
@@ -134,7 +130,7 @@ def test_packs_that_come_too_late_are_not_planned_with():
 def test_no_uas_comes_home_for_nothing_to_fly_with_a_fresh_pack():
     """It has a little less charge than a fresh pack: the next one would last for both fields."""
     fresh_home = two_fields(75.0)
-    now = replace(fresh_home, budget_s=np.array([60.0]))
+    now = fresh_home.replace(budget_s=np.array([60.0]))
     order = improve_trips(now, empty_routes(1), SOME, 0, packs(fresh_home, 3))
     assert len(order.routes[0])
 
@@ -142,7 +138,7 @@ def test_no_uas_comes_home_for_nothing_to_fly_with_a_fresh_pack():
 def test_a_flight_that_is_planned_stays_one_though_its_charge_seems_too_small():
     home = two_fields(45.0)
     whole = found(home, packs(home, 1))
-    tight = replace(home, budget_s=np.array([30.0]))
+    tight = home.replace(budget_s=np.array([30.0]))
     planned = packs(home, 2, is_planned=np.array([True]))
     assert len(improve_trips(tight, whole, SOME, 0, packs(home, 2)).routes[0]) < 3
     assert set(improve_trips(tight, whole, SOME, 0, planned).routes[0]) == set(whole.routes[0])

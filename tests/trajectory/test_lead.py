@@ -9,7 +9,7 @@ from uas_coverage_baselines.trajectory.flight_model import (
     in_wind,
     reduced_state,
 )
-from uas_coverage_baselines.trajectory.in_wind import InWind
+from uas_coverage_baselines.trajectory.in_wind import tour_in_wind
 from uas_coverage_baselines.trajectory.lead import Lead
 
 from uas_coverage_env import rollout
@@ -54,6 +54,17 @@ def test_the_model_in_a_wind_is_what_the_autopilot_believes_of_it(led):
         write_command(command, WRENCH, u[2], roll_Nm, pitch_Nm)
         fly_kinematically(vehicle, x, np.zeros(2), command, np.zeros(N_INPUTS), learnt.belief[0])
         np.testing.assert_allclose(reduced_state(x), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("wind_mps", [(0.0, 0.0), (3.0, -4.0), (-6.0, 8.0)])
+def test_a_plan_in_a_wind_leaves_room_for_gusts(led, wind_mps):
+    # gusts of a tenth of the wind, and a twenty-fifth of it upwards (`autopilot.belief`)
+    vehicle, speed_mps = led[1].vehicles[0], np.hypot(*wind_mps)
+    still = flight_model(vehicle, 0.0)
+    windy = in_wind(still, np.array(wind_mps))
+    assert windy.norms[0] == pytest.approx(12.0 - 0.1 * speed_mps)
+    np.testing.assert_array_equal(windy.norms[1:], still.norms[1:])
+    np.testing.assert_allclose(windy.vertical, np.array([3.0, 1.5]) - 0.04 * speed_mps)
 
 
 def test_what_leads_visits_all_waypoints_and_lands_within_its_airspeed(led):
@@ -112,8 +123,7 @@ def test_what_leads_into_an_obstacle_is_not_flown():
 def test_flights_are_planned_ahead_in_light_wind(monkeypatch, mean_mps, leads):
     asked = []
     monkeypatch.setattr(Lead, "commands", lambda self, *args: asked.append(args))
-    in_any = InWind(0.3)
-    brief = MissionBrief.of(steady(mean_mps))
-    assert in_any.takes(brief, SearchEffort(1000), 0)
-    in_any.act(first_sight(brief))
+    tour, brief = tour_in_wind(SearchEffort(1000), 0.3), MissionBrief.of(steady(mean_mps))
+    tour.reset(brief, 0)
+    tour.act(first_sight(brief))
     assert bool(asked) == leads

@@ -86,3 +86,10 @@ def test_few_late_steps_are_forgiven_and_many_are_not():
         failures.next_step()
     failures.add(np.nextafter(FAILURES, 9.0))
     assert failures.are_many
+
+
+def test_the_record_says_that_tour_flies_in_a_stated_wind_and_no_other_planner_in_still_air():
+    in_wind = rollout(windy(3.0), planner(), max_steps=3)
+    assert all("tour" in decision.flown_by for decision in in_wind.decisions)
+    still = rollout(field(), planner(), max_steps=3)
+    assert not any(decision.flown_by for decision in still.decisions)

@@ -80,15 +80,15 @@ def test_a_uas_alone_waits_as_long_as_its_charge_lasts_and_comes_home(until_s, c
 
 def test_the_uas_that_can_wait_longest_waits():
     one = waiting((1.0, 0.4))
-    assert one.barred[:, PARKED_ON].tolist() == [False, True]
-    assert not one.barred[:, :PARKED_ON].any()
+    assert one.forbidden[:, PARKED_ON].tolist() == [False, True]
+    assert not one.forbidden[:, :PARKED_ON].any()
     other = waiting((0.4, 1.0))
-    assert other.barred[:, PARKED_ON].tolist() == [True, False]
+    assert other.forbidden[:, PARKED_ON].tolist() == [True, False]
 
 
 def test_a_uas_that_can_wait_until_the_mission_ends_may_wait_wherever_its_home_is():
     both = waiting((1.0, 0.8), max_steps=120)
-    assert not both.barred.any()
+    assert not both.forbidden.any()
     assert 60 < both.latest[PARKED_ON] < 120
 
 

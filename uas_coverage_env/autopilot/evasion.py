@@ -45,7 +45,7 @@ LINGERING = 0.05
 
 
 @kernel
-def _room_m(arena, step, i, path_m):
+def room_from_movers(arena, step, i, path_m):
     """How well a path keeps clear of moving obstacles that go on as they go now [m].
 
     The least room to spare along the path, at most _ENOUGH_M; where it is negative, less a little
@@ -122,7 +122,7 @@ def _write_flight(arena, i, heading_rad, turn, climb, share, command):
 @kernel
 def _keep_better(arena, state, i, command, tail_m, best):
     """Keep a flight if it has more room than the best so far, in the columns _ROOM to _DOWN."""
-    room_m = _room_m(arena, state.step[0], i, tail_m)
+    room_m = room_from_movers(arena, state.step[0], i, tail_m)
     if room_m > best[_ROOM]:
         best[_ROOM] = room_m
         for axis in range(3):
@@ -178,7 +178,7 @@ def evade(arena, state, i, heading_rad, nonlinear, command, path_m, committed_m)
         return False
     tail_m = np.empty(path_m.shape)
     best = stack_array(4)
-    best[_ROOM] = _room_m(arena, state.step[0], i, path_m)
+    best[_ROOM] = room_from_movers(arena, state.step[0], i, path_m)
     best[_NORTH] = best[_EAST] = best[_DOWN] = 0.0
     _look_far(
         arena, state, i, heading_rad, nonlinear, command, path_m, tail_m, committed_m, best

@@ -1,8 +1,8 @@
 """A velocity command that flies a UAS to a waypoint or home, past the fixed obstacles.
 
 Constants without a source were chosen by hand on flights of the village. What they cost is shown by
-`benchmarks/returns.py` for the way home, and by `benchmarks/missions.py --planners
-nearest-waypoint` for flights past waypoints.
+`benchmarks/returns.py` for the way home, and by `uas-coverage compare --planners nearest-waypoint`
+for flights past waypoints.
 """
 
 import math

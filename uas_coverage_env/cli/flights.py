@@ -64,6 +64,9 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
         counts = result.get("fallback_reasons", {}).items()
         why = f" ({', '.join(f'{n} {reason}' for reason, n in counts)})" if counts else ""
         screen.print(f"decisions: {times}; {result['fallbacks']} fallbacks{why}", markup=False)
+    if flew := result.get("flown_by"):
+        who = ", ".join(f"{name} in {share:.0%}" for name, share in flew.items())
+        screen.print(f"flown by others than the planner: {who} of the decisions", markup=False)
     if flight.safety_filter:
         share = result["filtered_share"]
         screen.print(f"the safety filter replaced {share:.1%} of the commands", markup=False)

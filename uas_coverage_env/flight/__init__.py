@@ -11,7 +11,6 @@ from uas_coverage_env.flight.picture import flight_picture
 from uas_coverage_env.flight.planner import (
     Assistants,
     AssistedOptions,
-    Decision,
     Planner,
     PlannerOptions,
 )
@@ -21,6 +20,7 @@ from uas_coverage_env.flight.registry import describe_planners, load_planner, pl
 from uas_coverage_env.flight.rest import rest_of
 from uas_coverage_env.flight.seen import seen_ground
 from uas_coverage_env.flight.sorties import fly_sorties, sorties_summary
+from uas_coverage_env.planning.decision import Decision
 
 __all__ = [
     "MODES",

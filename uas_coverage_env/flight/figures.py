@@ -275,6 +275,13 @@ FIGURES = (
            "why there were fallbacks → how many; absent where there were none",
            text=lambda reasons: ", ".join(f"{n} {why}" for why, n in reasons.items()),
            optional=True),
+    Figure("flown_by", dict, lambda flight: metrics.flown_by(flight) or None,
+           "who flew in place of the planner → in which share of the decisions: another planner, "
+           "the world's `guidance`, or `legs` of an autopilot; absent where the planner flew alone",
+           text=_parts("{:.0%}".format), optional=True),
+    Figure("by_others_share", float, metrics.by_others_share,
+           "share of the decisions in which any of them did", "flown by others", digits=1,
+           key="", shown=False, absent=0.0, over="average", table="outcome"),
     Figure("filtered_share", float,
            lambda flight: metrics.filtered_share(flight) if flight.safety_filter else None,
            "share of the commands that the safety filter replaced; absent where it is off",

@@ -1,7 +1,7 @@
 """The log of a flight under way: samples and steps as they come, arrays in the end."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,6 @@ from uas_coverage_env.entities.state import FLYING, SWAPPING
 from uas_coverage_env.entities.state import LOST as IS_LOST
 from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.features.event import OfUas
-from uas_coverage_env.flight.planner import Decision
 from uas_coverage_env.flight.record import (
     COVERING,
     LANDED,
@@ -30,12 +29,13 @@ from uas_coverage_env.flight.record import (
     Violation,
     last_samples,
 )
+from uas_coverage_env.planning.decision import GUIDANCE, Decision
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.discharge import open_circuit_V
 from uas_coverage_env.vehicle.limits import LIMIT_NAMES, N_LIMITS, write_limited
-from uas_coverage_env.world import Command
+from uas_coverage_env.world import Command, GoTo
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class FlightLog:
             for name, returning in zip(names, outcome["returning"], strict=True)
         ]
         filtered = int(outcome["filtered"].sum())
-        record = _decision_record(took, decision, filtered)
+        record = _decision_record(took, decision, filtered, commands.values())
         plan = _plan_rows(decision, self.steps, names)
         self._covered += int(outcome["newly_covered"].sum())
         step = _Step(outcome, modes, record, plan, paid, self._sample())
@@ -281,11 +281,18 @@ def _plan_rows(decision: Decision | None, step: int, names: tuple[str, ...]) -> 
     return np.concatenate(parts)
 
 
-def _decision_record(took: Taken, decision: Decision | None, filtered: int) -> DecisionRecord:
+def _decision_record(
+    took: Taken, decision: Decision | None, filtered: int, commands: Iterable[Command]
+) -> DecisionRecord:
     gap = reason = None
+    by = [] if decision is None else [str(who) for who in decision.flown_by]
+    if any(isinstance(each, GoTo) and each.waypoint is not None for each in commands):
+        by.append(GUIDANCE)
     if decision is not None:
         if decision.mip_gap is not None and math.isfinite(decision.mip_gap):
             gap = float(decision.mip_gap)  # an infinite gap says that there is no bound
         reason = None if decision.reason is None else str(decision.reason)
     fallback = decision is not None and decision.fallback
-    return DecisionRecord(took.wall_s, fallback, gap, filtered, reason, took.processor_s)
+    return DecisionRecord(
+        took.wall_s, fallback, gap, filtered, reason, took.processor_s, tuple(dict.fromkeys(by))
+    )

@@ -208,6 +208,18 @@ def n_fallbacks(flight: FlightRecord) -> int:
     return sum(decision.fallback for decision in flight.decisions)
 
 
+def flown_by(flight: FlightRecord) -> dict[str, float]:
+    """Who flew in place of the planner, and in which share of the decisions: the most first."""
+    who = Counter(name for decision in flight.decisions for name in decision.flown_by)
+    return {name: n / len(flight.decisions) for name, n in who.most_common()}
+
+
+def by_others_share(flight: FlightRecord) -> float:
+    """Share of the decisions in which another than the planner flew, 0..1."""
+    flown = sum(bool(decision.flown_by) for decision in flight.decisions)
+    return flown / max(len(flight.decisions), 1)
+
+
 def ground_phases(flight: FlightRecord) -> list[dict[str, Any]] | None:
     """Take-off and landing of each UAS, which lie outside of the samples; None: there are none.
 

@@ -109,6 +109,7 @@ class _Decision(StrictModel):
     filtered: Count = 0
     reason: str | None = None
     processor_s: Seconds | None = None
+    flown_by: tuple[str, ...] = ()
 
 
 class _Event(StrictModel):

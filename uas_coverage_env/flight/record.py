@@ -196,7 +196,8 @@ class DecisionRecord:
 
     `filtered` counts the UAS whose command the safety filter replaced; `reason` says why there was
     a fallback, where the planner says it; `processor_s` is the processor time [s] of all threads,
-    None in a flight from a log or of a version before.
+    None in a flight from a log or of a version before; `flown_by` says who flew in place of the
+    planner, see `Decision`.
     """
 
     duration_s: float
@@ -205,6 +206,7 @@ class DecisionRecord:
     filtered: int = 0
     reason: str | None = None
     processor_s: float | None = None
+    flown_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

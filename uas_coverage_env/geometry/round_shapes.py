@@ -33,6 +33,23 @@ def closed_cylinder_faces(H: int) -> NDArray[np.float64]:
     return np.vstack([cylinder_faces(H), _ends()])
 
 
+def outside_upright_m(
+    away_m: NDArray[np.float64], radius_m: float = 0.0, half_height_m: float = 0.0
+) -> NDArray[np.float64]:
+    """(...) distance of places from a closed upright cylinder about the origin [m].
+
+    The same of many places as `segments.outside_cylinder` of one; without a size the distance of
+    two points, level or upright, whichever is larger.
+
+    Args:
+        away_m: (..., 3) [m].
+        radius_m: Of the cylinder.
+        half_height_m: Of the cylinder.
+    """
+    level_m = np.hypot(away_m[..., 0], away_m[..., 1]) - radius_m
+    return np.maximum(level_m, np.abs(away_m[..., 2]) - half_height_m)
+
+
 def sphere_faces(H: int) -> NDArray[np.float64]:
     """Sphere, an H-sided polygon in the horizontal and in the vertical plane.
 

@@ -14,11 +14,9 @@ from uas_coverage_agents.route.layers import Layers
 from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import SPARE_S, build, no_record, route_workspace
 from uas_coverage_env.entities.state import LANDED
-from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
+from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.mission.access import Access
-from uas_coverage_env.mission.guided_flight import GuidedFlight
-from uas_coverage_env.mission.handover import Handover
-from uas_coverage_env.mission.recall import Recall
+from uas_coverage_env.planning.following import Following
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 BoolArray = NDArray[np.bool_]
@@ -56,8 +54,8 @@ class FleetRoutes:
     ) -> None:
         self._score, self._home_score = score, home_score
         self._samples, self._changes = samples, changes
-        self.view, self._missions = WorldView(brief), MissionMaker(brief)
-        self._guided, self._handover = GuidedFlight(brief), Handover(brief)
+        self._following, self._missions = Following(brief), MissionMaker(brief)
+        self.view, self._guided = self._following.view, self._following.guided
         self._has_way: BoolArray = np.asarray(Access(brief).has_way.any(axis=0))
         self.by_guidance = False
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
@@ -69,14 +67,13 @@ class FleetRoutes:
         self._rng = np.random.default_rng(seed)
         self._built_for: tuple[BoolArray, ...] | None = None
         self._built_at = -_AGAIN_STEPS
-        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
         self._blocked = self._renew(first_sight(brief))
 
     def update(self, swarm: SwarmState) -> None:
         """Go on to this sample; build the routes again where they are no longer right."""
         self._blocked = self._renew(swarm)
         flown_to = {swarm.names[u]: int(self._routes[u, 0]) for u in np.flatnonzero(self._lengths)}
-        self._onwards = self._guided.commands(swarm, flown_to, self._blocked)
+        self._onwards = self._following.towards(self._seen, flown_to)
 
     @property
     def given_up(self) -> dict[int, str]:
@@ -119,7 +116,7 @@ class FleetRoutes:
 
     def guided(self, swarm: SwarmState, u: int) -> Command | None:
         """The command where guidance flies a UAS: home, to what is hard or blocked, or in wind."""
-        if swarm.returning[u] or self._returns[u]:
+        if swarm.returning[u] or self._following.called[u]:
             return GoTo(None)
         if self._lengths[u] == 0:
             return GoTo(None) if self.by_guidance or not swarm.departed[u] else None
@@ -137,13 +134,9 @@ class FleetRoutes:
         return "covering" if self._lengths[u] else "return"
 
     def _renew(self, swarm: SwarmState) -> BoolArray:
-        self.view.update(swarm)
-        blocked = self.view.blocked()
-        wanted = self._guided.wanted(swarm.uncovered) & self._has_way
-        if swarm.uncovered.any():
-            # the rule of return mode, which need not be on
-            self._returns = self._recall.update(swarm, self.view)
-        works = self._handover.workers(swarm) & ~swarm.returning & ~self._returns
+        seen = self._seen = self._following.update(swarm)
+        blocked, works = seen.blocked, seen.works
+        wanted = seen.wanted & self._has_way
         self._forget(~wanted, works)
         if self._has_to_build(swarm, wanted, blocked, works):
             self._situation = swarm, wanted, blocked, works

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from uas_coverage_agents.route.clock import Mission
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
+from uas_coverage_env.planning.reserves import LEARNED_ROUTE
 from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import SwarmState, build_arena
@@ -16,10 +16,8 @@ from uas_coverage_env.world import SwarmState, build_arena
 WEIGHT = 0.6
 """Of a second of any flight against one of the longest: the default of `trajectory`."""
 
-_LEGS = 0.96
-"""Flights along a route take about this share of its legs."""
-
 _LONE_UNIT_S = 5.0
+_LEGS, _LANDING_S = LEARNED_ROUTE.legs_share, LEARNED_ROUTE.landing_s
 
 
 class MissionMaker:
@@ -55,18 +53,18 @@ class MissionMaker:
         battery_s = (self._uas["dod_max"] - x[:, S.DOD]) / self._uas["dod_per_s"]
         left_s = np.minimum(battery_s, self._until_s - swarm.time_s)
         here_home_s = np.array([legs.way_home_s(u, x[u, :3]) for u in range(n_uas)])
-        here_home_s = np.where(swarm.departed, _LEGS * here_home_s + TRAJECTORY.landing_s, 0.0)
+        here_home_s = np.where(swarm.departed, _LEGS * here_home_s + _LANDING_S, 0.0)
         return Mission(
             place_m=np.ascontiguousarray(legs.waypoints_m[:, :2]),
             radius_s=legs.turn_s.max(axis=0),
             between_s=self._between_s,
-            home_s=_LEGS * legs.home_s + TRAJECTORY.landing_s,
+            home_s=_LEGS * legs.home_s + _LANDING_S,
             start_m=np.ascontiguousarray(legs.starts_m[:, :2]),
             here_m=np.ascontiguousarray(x[:, :2]),
             velocity=np.ascontiguousarray(x[:, S.VX : S.VY + 1]) / self._speed_mps,
             from_s=_LEGS * np.array([legs.from_here_s(u, x[u, :3]) for u in range(n_uas)]),
             here_home_s=here_home_s,
-            budget_s=left_s - TRAJECTORY_RESERVE.kept_s,
+            budget_s=left_s - LEARNED_ROUTE.kept_s,
             may=works & (swarm.status == FLYING),
             late=late.copy(),
             unit_s=self._unit_s,

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence, Set
 from typing import Generic, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
@@ -27,13 +26,12 @@ from uas_coverage_baselines.milp_mpc.silent_uas import SilentUas
 from uas_coverage_baselines.milp_mpc.steering import Steering
 from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.entities.commands import HOME, Mode
-from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.mission.attempts import Attempts
-from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.refusal import refuse_what_asks
-from uas_coverage_env.world import Command, GoTo, SwarmState
+from uas_coverage_env.planning.around.handover import away_of
+from uas_coverage_env.world import Command, SwarmState
 
 _CAREFUL_WITHIN_M = 40.0  # of home a UAS that does not come nearer to it flies slowly
 
@@ -80,8 +78,8 @@ class MovingHorizon(ABC, Generic[Chosen]):
         return self._attempts.given_up
 
     def rehearsal(self) -> Self:
-        """The same planner with a short horizon, and time enough to compile everything."""
-        quick = self.options.model_copy(update={"time_limit_s": 10.0, "horizon": 8})
+        """The same planner with a short horizon, and no limit while everything is compiled."""
+        quick = self.options.model_copy(update={"time_limit_s": None, "horizon": 8})
         return type(self)(quick, self._given)
 
     def warm_up(self, brief: MissionBrief) -> None:
@@ -116,7 +114,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self._round_robin = RoundRobin()
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
-        self._attempts, self._handover = Attempts(brief), Handover(brief)
+        self._attempts = Attempts(brief)
         self._silent_uas = SilentUas(brief, self.options.moving_margin_m)
         self._called = set[str]()  # UAS whose plans have left no charge but for the way home
         self.last_decision = None
@@ -127,23 +125,14 @@ class MovingHorizon(ABC, Generic[Chosen]):
             swarm = self._in_wind.see(swarm)
         if not swarm.active:
             return {}
-        silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
-        if self._steering is None:
-            commands = self._of_workers(without(swarm, silent), swarm, silent)
-        else:
-            commands = self._steering.commands(without(swarm, silent))
-            self.last_decision = Decision({})
-        home = {swarm.names[u]: GoTo(None) for u in np.flatnonzero(silent)}
-        return {**commands, **home}
-
-    def _of_workers(
-        self, swarm: SwarmState, whole: SwarmState, silent: NDArray[np.bool_]
-    ) -> Mapping[str, Command]:
-        """Decide for those that take commands, the silent ones (U,) of the whole in their way."""
+        if self._steering is not None:
+            self.last_decision = Decision()
+            return self._steering.commands(swarm)
         began, self._returning_home = time.perf_counter(), frozenset[str]()
         wanted = self._attempts.wanted(swarm.uncovered)
         seen = swarm if wanted is swarm.uncovered else dataclasses.replace(swarm, uncovered=wanted)
-        problem = self._silent_uas.beside(self.problem(seen), whole, silent)
+        problem = self._silent_uas.beside(self.problem(seen), swarm, away_of(swarm))
+        self._called &= set(swarm.active)  # with a fresh pack it need not fly home
         if any(plan and set(problem.names) - set(plan.names) for plan in (self.plan, self._backup)):
             self.plan = self._backup = None  # one that is back has a part in neither
         if self._in_wind is not None:
@@ -184,7 +173,8 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self.plan, self._backup = plan.advanced(), backup.advanced()
         paths = {name: path for name, path in plan.positions().items() if name in swarm.active}
         gap = None if reason else plan.relative_gap()
-        self.last_decision = Decision(paths, reason is not None, gap, reason)
+        late = Reason.CUT_SHORT if plan.cut_short else None
+        self.last_decision = Decision(paths, reason is not None, gap, reason or late)
         if self._in_wind is not None:
             return self._in_wind.velocities(plan, swarm, self._announced)
         return first_inputs(plan, swarm, self._announced)
@@ -220,12 +210,12 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def _effort(self) -> Effort:
         return Effort(
-            time_limit_s=self.options.time_limit_s,
+            work=self.options.effort,
             threads=self.options.threads,
-            deterministic=self.options.deterministic,
             teams=self.options.teams,
             at_once=self.options.at_once,
             solver=self.options.solver,
+            time_limit_s=self.options.time_limit_s,
         )
 
     def _announced(self, name: str) -> Mode:

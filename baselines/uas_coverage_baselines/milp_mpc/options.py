@@ -4,7 +4,7 @@ from copy import copy
 from dataclasses import fields
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, field_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from uas_coverage_baselines.margins import MarginM, MovingMarginM
 from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named
@@ -31,6 +31,14 @@ def _split(text: Any) -> Any:
         return text
     names = (part.strip() for part in text.split(","))
     return tuple(name for name in names if name not in ("", "none"))
+
+
+def _endless(text: Any) -> Any:
+    return None if text in ("none", "inf") else text
+
+
+TimeLimitS = Annotated[float | None, BeforeValidator(_endless)]
+"""A limit as it is typed: seconds, or none."""
 
 
 class OcpOptions(PlannerOptions):
@@ -97,13 +105,20 @@ class OcpOptions(PlannerOptions):
 class MovingHorizonOptions(OcpOptions):
     """What a MILP-MPC in real time takes."""
 
-    time_limit_s: float = Field(
-        default=1.0, gt=0.0, le=3600.0, description="wall clock per decision"
+    effort: float = Field(
+        default=1.0,
+        gt=0.0,
+        le=1000.0,
+        description="work per decision, the same on every machine; 1 takes about 1 s of a core",
     )
-    threads: int = Field(default=2, ge=1, le=64, description="programs solved side by side")
-    deterministic: bool = Field(
-        default=False,
-        description="limit work by nodes, not by the clock: the same seed flies the same",
+    time_limit_s: TimeLimitS = Field(
+        default=None,
+        gt=0.0,
+        le=3600.0,
+        description="wall clock at which a decision ends all the same [s]; none: never",
+    )
+    threads: int = Field(
+        default=2, ge=1, le=64, description="programs solved side by side; changes no flight"
     )
     limit_sides: int = Field(
         default=16,
@@ -121,6 +136,15 @@ class MovingHorizonOptions(OcpOptions):
         le=64,
         description="most UAS planned in one decision; the others continue with their plans",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_clock(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "deterministic" in given:
+            raise ValueError(
+                "deterministic went: every flight is, unless time_limit_s is given; leave it out"
+            )
+        return given
 
     @property
     def form(self) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S
 from uas_coverage_baselines.milp_mpc.getaway import getaway_margin_m
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
     seconds_onward,
@@ -28,6 +27,7 @@ from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.mission import MissionBrief, Ways, WorldView
 from uas_coverage_env.mission.ways import Way
+from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.scenario import Uas
 from uas_coverage_env.vehicle import VehicleParams, linear_model
 from uas_coverage_env.vehicle import layout as S

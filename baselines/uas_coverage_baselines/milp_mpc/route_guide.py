@@ -11,24 +11,23 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.problem import TourSegment
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.planning.reserves import ORDER_GUIDE, ORDER_GUIDE_RESERVE
+from uas_coverage_env.planning.reserves import ORDER_GUIDE
 from uas_coverage_env.planning.routing import (
     Routes,
-    RoutingTask,
+    RoutingProblem,
     SearchEffort,
     empty_routes,
     improve_routes,
+    search_orders,
 )
 from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.planning.routing.window import RouteWindow
-from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 _MOVES_PER_WAYPOINT = 40_000  # of the first search, before take-off
 _MOVES_AT_MOST = 4_000_000
-_MOVES_AFTERWARDS = 60_000  # of each decision's, at most
-_MOVES_PER_S = 30_000  # of the decision's time limit, over all threads
+_MOVES_AFTERWARDS = 60_000  # of each decision's
 _FIRST_SEARCHES = 3
 _SEARCHED_AGAIN = 60  # waypoints of each route, at most, at every decision
 _WORTH_CHANGING_S = 0.5
@@ -64,16 +63,13 @@ class RouteGuide:
         brief: MissionBrief,
         builder: ProblemBuilder,
         shape: TourShape,
-        decision_s: float = np.inf,
         total_weight: float = SearchEffort.total_weight,
     ) -> None:
-        self._builder, self._shape = builder, shape
+        self._brief, self._builder, self._shape = brief, builder, shape
         self._glance = SearchEffort(0, total_weight=total_weight)  # costs alone, no search
-        self._moves = int(min(_MOVES_AFTERWARDS, _MOVES_PER_S * decision_s))
         self._legs = Legs(brief)
         self._names = tuple(uas.name for uas in brief.uas)
         self._radius_m = np.array([w.radius_m for w in brief.waypoints])
-        self._weight = np.array([w.weight for w in brief.waypoints], float)
         self._order: Routes | None = None
         self.blocked: set[int] = set()
         self._waits = False  # whether blocked waypoints are waited for, once little else is left
@@ -85,30 +81,27 @@ class RouteGuide:
 
     def begin(self, swarm: SwarmState, seed: int) -> None:
         """Search long, before take-off."""
-        task = self._task(swarm)
-        moves = min(_MOVES_PER_WAYPOINT * max(len(task.open_waypoints), 1), _MOVES_AT_MOST)
+        problem = self._problem(swarm)
+        moves = min(_MOVES_PER_WAYPOINT * max(len(problem.open_waypoints), 1), _MOVES_AT_MOST)
         effort = replace(self._glance, moves=moves)
-        orders = [
-            improve_routes(task, empty_routes(task.n_uas), effort, seed + attempt)
-            for attempt in range(_FIRST_SEARCHES)
-        ]
-        self._order = min(orders, key=lambda order: order.cost_s)
+        searches = [(effort, seed + attempt) for attempt in range(_FIRST_SEARCHES)]
+        self._order = search_orders(problem, empty_routes(problem.n_uas), searches)[0]
 
     def take(self, swarm: SwarmState, order: Routes) -> None:
         """Begin with an order that was searched elsewhere."""
-        self._order = improve_routes(self._task(swarm), order, self._glance, 0)
+        self._order = improve_routes(self._problem(swarm), order, self._glance, 0)
 
     def update(self, swarm: SwarmState) -> None:
         """Bring the order up to date with what is seen now."""
         previous = self._order or empty_routes(len(self._names))
-        task = self._task(swarm)
-        effort = replace(self._glance, moves=self._moves, hottest_s=1.5, window=24)
-        kept = improve_routes(task, previous, self._glance, 0)
-        part = RouteWindow.of(task, kept, _SEARCHED_AGAIN)
-        first = (
-            kept if part.task is task else improve_routes(part.task, part.order, self._glance, 0)
-        )
-        better = improve_routes(part.task, first, effort, swarm.step)
+        problem = self._problem(swarm)
+        effort = replace(self._glance, moves=_MOVES_AFTERWARDS, hottest_s=1.5, window=24)
+        kept = improve_routes(problem, previous, self._glance, 0)
+        part = RouteWindow.of(problem, kept, _SEARCHED_AGAIN)
+        first = kept
+        if part.problem is not problem:
+            first = improve_routes(part.problem, part.order, self._glance, 0)
+        better = improve_routes(part.problem, first, effort, swarm.step)
         worthwhile = better.cost_s < first.cost_s - _WORTH_CHANGING_S
         self._order = part.joined(better) if worthwhile else kept
 
@@ -148,16 +141,10 @@ class RouteGuide:
         within = until[: len(route)] <= horizon_s
         return route[: min(int(within.sum()), self._shape.most)]
 
-    def _task(self, swarm: SwarmState) -> RoutingTask:
-        rows = np.array([swarm.names.index(name) for name in self._names])
-        active = np.array([name in swarm.active for name in self._names])
-        x = swarm.x[rows]
-        left_s = np.array(
-            [self._builder.seconds_left(n, x[u, DOD]) for u, n in enumerate(self._names)]
-        )
+    def _problem(self, swarm: SwarmState) -> RoutingProblem:
         # when a blocked waypoint opens is not known: it is left aside as long as there is other
         # work, since an order that waits has no reason to be quick with the rest
-        wanted, opens = swarm.uncovered.copy(), np.zeros(len(self._weight))
+        wanted, opens = swarm.uncovered.copy(), np.zeros(len(self._radius_m))
         self.blocked = self._builder.blocked_waypoints(swarm)
         blocked = list(self.blocked)
         if self._order is not None and self._order.seconds.max() < _WAIT_WHEN_LEFT_S:
@@ -169,13 +156,12 @@ class RouteGuide:
         opens[blocked] = _WAIT_S
         self._near_enough_m = 0.5 * self._radius_m
         self._near_enough_m[blocked] = _WAITING_M
-        return RoutingTask.of(
+        return RoutingProblem.seen(
+            self._brief,
+            swarm,
             self._legs,
-            x,
-            active,  # a UAS that is not there any more can visit nothing
+            np.isin(swarm.names, swarm.active),  # one that is not there any more can visit nothing
+            ORDER_GUIDE,
             open_waypoints=wanted,
-            weight=self._weight,
-            budget_s=left_s - ORDER_GUIDE_RESERVE.kept_s,
-            landing_s=ORDER_GUIDE.landing_s,
-            not_before_s=opens,
+            release_s=opens,
         )

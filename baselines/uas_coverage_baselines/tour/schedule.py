@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M
-from uas_coverage_env.planning.reserves import TOUR, TOUR_RESERVE, TOUR_SCARCE_RESERVE
+from uas_coverage_env.planning.reserves import TOUR, TOUR_SCARCE
 from uas_coverage_env.planning.routing import (
     Routes,
-    RoutingTask,
+    RoutingProblem,
     SearchEffort,
     empty_routes,
     improve_routes,
+    search_orders,
 )
 from uas_coverage_env.planning.routing.legs import Legs
+from uas_coverage_env.planning.routing.problem import budget_s
 from uas_coverage_env.planning.routing.trips import FreshPacks, Packs, improve_trips
-from uas_coverage_env.vehicle.layout import DOD
-from uas_coverage_env.world import Arena, SwarmState
+from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 
@@ -68,23 +69,20 @@ class View:
 class Schedule:
     """The order of the swarm, kept up to date."""
 
-    def __init__(self, brief: MissionBrief, arena: Arena, effort: SearchEffort) -> None:
-        self.legs, self._packs = Legs(brief), Packs.of(brief)
+    def __init__(self, brief: MissionBrief, effort: SearchEffort) -> None:
+        self._brief, self.legs, self._packs = brief, Legs(brief), Packs.of(brief)
         self._wind_mps, self._knows_wind = np.zeros(2), False
-        self._arena, self._can_cover = arena, brief.can_cover
-        self._charge_share = 1.0 if brief.conditions is None else brief.conditions.charge_share
-        self._effort = effort
-        self._weight = np.array([w.weight for w in brief.waypoints], float)
+        self._can_cover, self._effort = brief.can_cover, effort
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
-        self._reserve = TOUR_RESERVE
+        self._reserve = TOUR
         self._flown_s = np.full(len(brief.uas), _PACE_KNOWN_S * _PACE)
         self._legs_flown_s = np.full(len(brief.uas), _PACE_KNOWN_S)
 
     def begin(self, view: View, seed: int) -> None:
         """Search long: before take-off, and when the wind is known."""
         if (view.blocked & view.uncovered).any():  # how late is late, is known with an order
-            self.take(improve_routes(self.task(view), self.order, self._effort, seed), view)
+            self.take(improve_routes(self.problem(view), self.order, self._effort, seed), view)
         order = self._searched(view, seed)
         if len(order.left_out):
             self._keep_less()
@@ -93,16 +91,13 @@ class Schedule:
 
     def _searched(self, view: View, seed: int) -> Routes:
         """The best of several long searches that begin with nothing."""
-        task, fresh = self.task(view), self._fresh_packs(view)
-        orders = [
-            improve_trips(task, empty_routes(task.n_uas), self._effort, seed + attempt, fresh)
-            for attempt in range(_FIRST_SEARCHES)
-        ]
-        return min(orders, key=lambda order: order.cost_s)
+        problem, fresh = self.problem(view), self._fresh_packs(view)
+        searches = [(self._effort, seed + attempt) for attempt in range(_FIRST_SEARCHES)]
+        return search_orders(problem, empty_routes(problem.n_uas), searches, fresh)[0]
 
     def _keep_less(self) -> None:
         """Use more of the charge: what is left at the end would have covered something."""
-        self._reserve = TOUR_SCARCE_RESERVE
+        self._reserve = TOUR_SCARCE
 
     def go_on(self, view: View, order: Routes) -> None:
         """Search from an order that was flown until the scene became another."""
@@ -151,12 +146,12 @@ class Schedule:
 
     def _searched_again(self, view: View) -> tuple[Routes, Routes]:
         """The present order with all that is open, and the best that was found from it."""
-        task, fresh = self.task(view), self._fresh_packs(view)
+        problem, fresh = self.problem(view), self._fresh_packs(view)
         again = replace(self._effort, moves=_MOVES_AGAIN)
-        kept = improve_trips(task, self.order, replace(again, moves=0), 0, fresh)
-        efforts = (replace(again, hottest_s=1.5), again)
-        found = [improve_trips(task, kept, effort, round(view.time_s), fresh) for effort in efforts]
-        return kept, min(found, key=lambda order: order.cost_s)
+        kept = improve_trips(problem, self.order, replace(again, moves=0), 0, fresh)
+        seed = round(view.time_s)
+        searches = [(replace(again, hottest_s=1.5), seed), (again, seed)]
+        return kept, search_orders(problem, kept, searches, fresh)[0]
 
     def take(self, order: Routes, view: View) -> None:
         """Fly an order from now on."""
@@ -212,10 +207,7 @@ class Schedule:
 
     def _budget_s(self, view: View) -> FloatArray:
         """(U,) seconds of legs that battery and clock allow each UAS."""
-        uas = self._arena.uas
-        left_s = self._charge_share * (uas["dod_max"] - view.x[:, DOD]) / uas["dod_per_s"]
-        left_s = np.minimum(left_s, self._until_s - view.time_s)
-        return (left_s - self._reserve.kept_s - self._reserve.spare_s) / self.pace
+        return budget_s(self._brief, view, self.legs, self._reserve, pace=self.pace)
 
     def _legs_left(self, view: View) -> FloatArray:
         """(U,) seconds of legs along each route and home, turns not counted."""
@@ -266,38 +258,29 @@ class Schedule:
         if view.swarm is None:
             return None
 
-        def task(x: FloatArray, may_work: NDArray[np.bool_]) -> RoutingTask:
-            return self.task(
-                replace(
-                    view,
-                    x=x,
-                    may_work=may_work,
-                    blocked=np.zeros_like(view.blocked),
-                    asked_in_s=None,
-                )
+        def problem(x: FloatArray, may_work: NDArray[np.bool_]) -> RoutingProblem:
+            free = np.zeros_like(view.blocked)
+            return self.problem(
+                replace(view, x=x, may_work=may_work, blocked=free, asked_in_s=None)
             )
 
-        return FreshPacks.seen(self._packs, view.swarm, self._until_s - view.time_s, task)
+        return FreshPacks.seen(self._packs, view.swarm, self._until_s - view.time_s, problem)
 
-    def task(self, view: View) -> RoutingTask:
+    def problem(self, view: View) -> RoutingProblem:
         """The routing problem of a moment."""
         # it is unknown when a blocked waypoint opens: late enough to do other work before, and soon
         # enough to be thought of while there is other work near it
         work_s = self._legs_left(view)[view.may_work]
         opens_s = max(_OPENS_AFTER * float(work_s.mean()), _OPENS_AFTER_S) if len(work_s) else 0.0
-        open_ = view.uncovered.copy()
-        if view.may_work.any():  # what no UAS can cover is no reason to search again
-            open_ &= self._can_cover[view.may_work].any(axis=0)
-        not_before_s = np.where(view.blocked, opens_s, 0.0)
+        release_s = np.where(view.blocked, opens_s, 0.0)
         if view.asked_in_s is not None:
-            not_before_s = np.maximum(not_before_s, view.asked_in_s)
-        return RoutingTask.of(
+            release_s = np.maximum(release_s, view.asked_in_s)
+        return RoutingProblem.seen(
+            self._brief,
+            view,
             self.legs,
-            view.x,
             view.may_work,
-            open_waypoints=open_,
-            weight=self._weight,
-            budget_s=self._budget_s(view),
-            landing_s=TOUR.landing_s,
-            not_before_s=not_before_s,
+            self._reserve,
+            release_s=release_s,
+            pace=self.pace,
         )

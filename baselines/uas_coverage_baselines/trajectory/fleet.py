@@ -30,24 +30,21 @@ from uas_coverage_baselines.trajectory.space import Body, space_of
 from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.access import Access
-from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_RESERVE
-from uas_coverage_env.planning.routing import RoutingTask
+from uas_coverage_env.planning.reserves import TRAJECTORY, TRAJECTORY_LATER, TRAJECTORY_WITH_ROOM
+from uas_coverage_env.planning.routing import RoutingProblem
+from uas_coverage_env.planning.routing.problem import battery_s
 from uas_coverage_env.planning.routing.terrain import Terrain
 from uas_coverage_env.planning.routing.trips import FreshPacks, Packs
-from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_LEGS = 0.96  # flights along a route take this share of its legs, measured on generated towns
 # where the plant is not the model: what plans keep, and what is left of it to tracking
 _ROOM, _TRACKING_ROOM = 0.03, 0.01  # share of the limits
 _ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
 _TRACKING_ALLOWANCE = Allowance(inside_m=0.25, landing_distance=0.8, landing_speed=0.5)
 _WIDER_M = 0.3  # tracking keeps of obstacles beyond the distance of plans, where it can
-_PACE = 0.91  # of the budgets of routes: flights are slower, and come some steps later still
-_LATER_SHARE = 0.96  # of budgets of flights not planned yet: they differ from routes by 1.6 %
 _LATER_STEPS = 12  # to make way for another
 
 
@@ -61,7 +58,7 @@ class Moment:
         uncovered: (W,).
         earliest: (W,) steps from now before which a waypoint is not to be visited.
         time_s: Since the start.
-        barred: (U, W) which UAS are not to visit which waypoint; None: any may visit any.
+        forbidden: (U, W) which UAS are not to visit which waypoint; None: any may visit any.
     """
 
     x: FloatArray
@@ -69,7 +66,7 @@ class Moment:
     uncovered: NDArray[np.bool_]
     earliest: IntArray
     time_s: float
-    barred: NDArray[np.bool_] | None = None
+    forbidden: NDArray[np.bool_] | None = None
 
 
 class Fleet:
@@ -93,7 +90,7 @@ class Fleet:
         moving_margin_m: float = 0.0,
     ) -> None:
         self.brief, self.margin_m, self._speed_share = brief, margin_m, speed_share
-        self._moving_margin_m, self._pace = moving_margin_m, 1.0
+        self._moving_margin_m, self._reserve = moving_margin_m, TRAJECTORY
         self.terrain, self._packs = Terrain(brief), Packs.of(brief)
         arena = self.terrain.arena
         self.arena = arena
@@ -101,7 +98,6 @@ class Fleet:
         self.closed_off = np.zeros((len(brief.uas), len(brief.waypoints)), np.bool_)
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self.radius_m = np.array([w.radius_m for w in brief.waypoints], float)
-        self._weight = np.array([w.weight for w in brief.waypoints], float)
         self.programs = [
             FlightProgram(
                 flight_model(arena.vehicles[u], speed_share=speed_share),
@@ -118,7 +114,7 @@ class Fleet:
 
     def leave_room(self) -> None:
         """Plan with part of the limits from now on: what flies is not what is planned with."""
-        self._pace = _PACE
+        self._reserve = TRAJECTORY_WITH_ROOM
         self.programs = [
             replace(
                 program,
@@ -145,38 +141,29 @@ class Fleet:
 
     def battery_s(self, x: FloatArray) -> FloatArray:
         """(U,) seconds that each battery lasts at full speed, and with the worst vehicle stated."""
-        uas, conditions = self.arena.uas, self.brief.conditions
-        share = 1.0 if conditions is None else conditions.charge_share
-        return share * (uas["dod_max"] - x[:, DOD]) / uas["dod_per_s"]
+        return battery_s(self.brief, self.terrain.legs, x)
 
-    def task(self, moment: Moment, less_s: FloatArray) -> RoutingTask:
+    def problem(self, moment: Moment, late_s: float | FloatArray = 0.0) -> RoutingProblem:
         """The routing problem of a moment.
 
         Args:
             moment: Where everything is.
-            less_s: (U,) taken off the budgets: what routes took more than expected.
+            late_s: (U,) taken off the budgets: what routes took more than expected.
         """
-        left_s = self.brief.max_steps * self.brief.dt_s - moment.time_s
-        barred = moment.barred
-        if self.closed_off.any():
-            barred = self.closed_off if barred is None else barred | self.closed_off
-        budget_s = (
-            self._pace * np.minimum(self.battery_s(moment.x), left_s)
-            - TRAJECTORY_RESERVE.kept_s
-            - less_s
-        )
-        return RoutingTask.of(
+        forbidden = self.closed_off.copy()
+        if moment.forbidden is not None:
+            forbidden |= moment.forbidden
+        return RoutingProblem.seen(
+            self.brief,
+            moment,
             self.terrain,
-            moment.x,
             moment.may_work,
+            self._reserve,
             open_waypoints=moment.uncovered,
-            weight=self._weight,
-            budget_s=budget_s,
-            landing_s=TRAJECTORY.landing_s,
-            not_before_s=self.brief.dt_s * moment.earliest.astype(float),
-            stretch=_LEGS / self._speed_share,
+            release_s=self.brief.dt_s * moment.earliest.astype(float),
+            forbidden=forbidden,
+            late_s=late_s,
             speed_share=self._speed_share,
-            barred=barred,
         )
 
     def fresh_packs(
@@ -189,16 +176,15 @@ class Fleet:
             uncovered: (W,) waypoints to be visited.
             planned: UAS whose flights are planned, along the routes to begin with.
         """
-        n_uas = len(swarm.x)
 
-        def task(x: FloatArray, may_work: NDArray[np.bool_]) -> RoutingTask:
+        def problem(x: FloatArray, may_work: NDArray[np.bool_]) -> RoutingProblem:
             now = np.zeros(len(uncovered), np.int64)
-            moment = Moment(x, may_work, uncovered, now, swarm.time_s)
-            return self.task(moment, np.zeros(n_uas))
+            return self.problem(Moment(x, may_work, uncovered, now, swarm.time_s))
 
         until_s = self.brief.max_steps * self.brief.dt_s - swarm.time_s
-        is_planned = np.isin(np.arange(n_uas), list(planned))
-        return FreshPacks.seen(self._packs, swarm, until_s, task, _LATER_SHARE, is_planned)
+        is_planned = np.isin(np.arange(len(swarm.x)), list(planned))
+        share = TRAJECTORY_LATER.time_share
+        return FreshPacks.seen(self._packs, swarm, until_s, problem, share, is_planned)
 
     def program(
         self,

@@ -29,7 +29,7 @@ from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import Work
 from uas_coverage_env.planning.routing import (
     Routes,
-    RoutingTask,
+    RoutingProblem,
     SearchEffort,
     empty_routes,
     improve_routes,
@@ -51,12 +51,12 @@ class Ahead(NamedTuple):
 
     Attributes:
         earliest: (W,) steps from then before which waypoints are not to be visited.
-        barred: (U, W) which UAS are not to visit which waypoint, if any.
+        forbidden: (U, W) which UAS are not to visit which waypoint, if any.
         movers: What moves, as each UAS sees it from then on.
     """
 
     earliest: NDArray[np.int64]
-    barred: BoolArray | None
+    forbidden: BoolArray | None
     movers: Mapping[int, Sequence[Body]]
 
 
@@ -166,7 +166,7 @@ class Improvement:
             wanted,
             expected.earliest,
             self._fleet.brief.dt_s * then,
-            expected.barred,
+            expected.forbidden,
         )
         order = replace(plan.order, routes=tuple(routes), left_out=np.zeros(0, np.int64))
         self._n_attempts += 1
@@ -188,18 +188,18 @@ class Improvement:
         dt_s = self._fleet.brief.dt_s
         seconds = dt_s * np.array([flight.steps for flight in known.values()])
         present_s = mission_cost_s(seconds, effort.total_weight)
-        task = self._fleet.task(moment, np.zeros(n_uas))
+        problem = self._fleet.problem(moment)
         nothing = SearchEffort(0, total_weight=effort.total_weight)
-        kept = improve_routes(task, order, nothing, 0)
+        kept = improve_routes(problem, order, nothing, 0)
         search = SearchEffort(
             moves, total_weight=effort.total_weight, by_pieces=n_uas > SMALL_FLEET
         )
-        searched = OrderSearch(_varied(task, seed), empty_routes(n_uas), search, seed)
+        searched = OrderSearch(_varied(problem, seed), empty_routes(n_uas), search, seed)
         part = _MOVES_PER_STEP * self._steps_each
         while not searched.is_over:
             yield self._steps_each
             searched.go_on(part)
-        new = improve_routes(task, searched.best, nothing, 0)
+        new = improve_routes(problem, searched.best, nothing, 0)
         key = tuple(route.tobytes() for route in new.routes)
         if len(new.left_out) or new.cost_s > HOPELESS * kept.cost_s or key in self._tried:
             return None
@@ -221,17 +221,16 @@ def all_but_own(planned: Mapping[int, Planned], shape: tuple[int, int]) -> BoolA
     return others
 
 
-def _varied(task: RoutingTask, seed: int) -> RoutingTask:
+def _varied(problem: RoutingProblem, seed: int) -> RoutingProblem:
     """The same problem with somewhat other leg times: legs are not as exact as flights are."""
     rng = np.random.default_rng(seed)
-    n_uas, n_waypoints = task.n_uas, task.n_waypoints
+    n_uas, n_waypoints = problem.n_uas, problem.n_waypoints
     noise = rng.uniform(-_VARIED, _VARIED, (n_waypoints, n_waypoints))
     ends = 1.0 + rng.uniform(-_VARIED, _VARIED, (2, n_uas, n_waypoints))
-    return replace(
-        task,
-        between_s=task.between_s * (1.0 + 0.5 * (noise + noise.T)),
-        first_s=task.first_s * ends[0],
-        home_s=task.home_s * ends[1],
+    return problem.replace(
+        between_s=problem.between_s * (1.0 + 0.5 * (noise + noise.T)),
+        first_s=problem.first_s * ends[0],
+        home_s=problem.home_s * ends[1],
     )
 
 

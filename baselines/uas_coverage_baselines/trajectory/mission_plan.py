@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +22,13 @@ from uas_coverage_baselines.trajectory.retiming import Draft
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.planning.routing import Routes, RoutingTask, SearchEffort, empty_routes
+from uas_coverage_env.planning.routing import (
+    Routes,
+    RoutingProblem,
+    SearchEffort,
+    empty_routes,
+    search_orders,
+)
 from uas_coverage_env.planning.routing.trips import FreshPacks, improve_trips
 from uas_coverage_env.world import SwarmState
 
@@ -216,17 +221,17 @@ def _best_plan(
         flown: Routes and flights from here that are as good as planned already.
         fresh: Packs for later flights, of which nothing is planned yet but what they will visit.
     """
-    less_s = np.zeros(len(moment.x))
+    late_s = np.zeros(len(moment.x))
     best: MissionPlan | None = None
     flights = {(u, route.tobytes()): flight for u, (route, flight) in (flown or {}).items()}
     for _ in range(_BUDGETS):
-        task = fleet.task(moment, less_s)
+        problem = fleet.problem(moment, late_s)
         known: set[tuple[bytes, ...]] = set()
-        orders = _orders(task, effort, seed, kept, fresh)[: effort.planned]
+        orders = _orders(problem, effort, seed, kept, fresh)[: effort.planned]
         if orders[0].trips:  # flights of now alone do not tell which order is cheaper
             orders = orders[:1]
         for order in orders:
-            if task.n_uas > SMALL_FLEET and order.cost_s > HOPELESS * orders[0].cost_s:
+            if problem.n_uas > SMALL_FLEET and order.cost_s > HOPELESS * orders[0].cost_s:
                 break
             key = tuple(route.tobytes() for route in order.routes)
             if key not in known:
@@ -242,20 +247,20 @@ def _best_plan(
             fresh = fresh.shorter(_SHORTER, too_long)  # for later flights as for those of now
             continue
         battery_s = fleet.battery_s(moment.x)
-        if task.n_uas <= SMALL_FLEET:
-            less_s[too_long] += _SHORTER * battery_s[too_long]
+        if problem.n_uas <= SMALL_FLEET:
+            late_s[too_long] += _SHORTER * battery_s[too_long]
             continue
         # the UAS that take over their waypoints will be as late
         routes, dt_s = best.order.routes, fleet.brief.dt_s
         flown_s = [dt_s * flights[u, routes[u].tobytes()].steps for u in too_long]
         late = np.max(flown_s / best.order.seconds[too_long]) - 1.0
-        less_s += max(_SHORTER, float(late)) * battery_s
+        late_s += max(_SHORTER, float(late)) * battery_s
     assert best is not None
     return best
 
 
 def _orders(
-    task: RoutingTask,
+    problem: RoutingProblem,
     effort: Effort,
     seed: int,
     kept: Routes | None,
@@ -264,20 +269,19 @@ def _orders(
     nothing = SearchEffort(0)
     if kept is not None and kept.trips:  # the cheapest of these is flown, with no other look at it
         nothing = SearchEffort(0, total_weight=effort.total_weight)
-    found = [] if kept is None else [improve_trips(task, kept, nothing, 0, fresh)]
+    found = [] if kept is None else [improve_trips(problem, kept, nothing, 0, fresh)]
 
-    def searched(k: int) -> Routes:
-        begin = empty_routes(task.n_uas) if kept is None else kept
-        search = SearchEffort(
+    def search(k: int) -> SearchEffort:
+        return SearchEffort(
             effort.moves,
             hottest_s=4.0 if kept is None or k else 1.5,
             total_weight=effort.total_weight,
-            by_pieces=task.n_uas > SMALL_FLEET,
+            by_pieces=problem.n_uas > SMALL_FLEET,
         )
-        return improve_trips(task, begin, search, seed + k, fresh)
 
-    with ThreadPoolExecutor(effort.threads) as side_by_side:  # the search frees the GIL
-        found += side_by_side.map(searched, range(effort.orders))
+    begin = empty_routes(problem.n_uas) if kept is None else kept
+    searches = [(search(k), seed + k) for k in range(effort.orders)]
+    found += search_orders(problem, begin, searches, fresh, effort.threads)
     return sorted(found, key=lambda order: order.cost_s)
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.trajectory.space import Body, apart_m
+from uas_coverage_baselines.trajectory.space import Body
+from uas_coverage_env.geometry.round_shapes import outside_upright_m
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.backup.course import NO_NEARER_M, apart_m
 from uas_coverage_env.vehicle.layout import VX, VZ
 from uas_coverage_env.world import SwarmState
 
@@ -134,11 +136,10 @@ class Movers:
         for m in range(len(self)):
             other_m = self.path_m(m, len(path_m) - 1)
             size = float(self.radius_m[m]), float(self.half_height_m[m])
-            away = path_m[0] - other_m[0]
-            now_m = max(float(np.hypot(away[0], away[1])) - size[0], abs(away[2]) - size[1])
+            now_m = float(outside_upright_m(path_m[0] - other_m[0], *size))
             keep_m = radius_m + self.safe_m[m] + margin_m + self.surprise_m[m]
             clearance_m = float(apart_m(path_m, other_m, *size))
-            spare = min(spare, clearance_m - min(float(keep_m), now_m - 1e-3))
+            spare = min(spare, clearance_m - min(float(keep_m), now_m - NO_NEARER_M))
         return spare
 
     def open_from(

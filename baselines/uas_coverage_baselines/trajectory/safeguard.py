@@ -1,27 +1,19 @@
 """What is flown now, such that there is something safe to fly at every later decision.
 
-Every UAS has a backup trajectory: the rest of its course where that stays clear of everything that
-moves, as that goes now; else the course followed for some steps and then braked to a hover. All
-backup trajectories of the fleet were verified together. After one step what is left of them is a
-set of such trajectories again, so whatever a new plan brings replaces them only where it is
-verified with the others (docs/safety.md has the argument). Where a backup trajectory no longer
-holds, because something moves otherwise than it did, or the UAS is elsewhere, the world's guidance
-and safety filter are asked, here, before the command is given.
+The supervisor (`planning.backup`) keeps a backup trajectory of every UAS, verified together. Where
+one no longer holds, because something moves otherwise than it did, or the UAS is elsewhere, the
+world's guidance and safety filter are asked, here, before the command is given.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.trajectory.course import (
-    Course,
-    are_apart,
-    braked,
-    hover_inputs,
-)
+from uas_coverage_baselines.trajectory.course import Course, are_apart, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.movers import Movers
 from uas_coverage_baselines.trajectory.space import spare_of_rules_m
@@ -32,12 +24,50 @@ from uas_coverage_env.entities.commands import GO_TO, HOME, WRENCH
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission import Range, WorldView
+from uas_coverage_env.planning.backup import Supervisor
 from uas_coverage_env.vehicle.layout import DELTA_THRUST
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
 
-_FOLLOWED = 30  # steps at most that a course is followed before braking
+
+@dataclass(frozen=True)
+class Seen:
+    """What the supervisor asks of a moment: hulls and fence exactly, bodies at their velocities.
+
+    Attributes:
+        fleet: The mission.
+        movers: What moves, as it is seen.
+        margin_m: Kept from what moves, in addition to its safe distance.
+        way_home: Of the UAS.
+    """
+
+    fleet: Fleet
+    movers: Movers
+    margin_m: float
+    way_home: Range
+
+    def is_clear(self, uas: int, course: Course) -> bool:
+        """Whether a course is clear of what moves; what stands was verified before."""
+        path_m = course.path_m(max(len(course.u), 1))
+        if course.lands and len(path_m) < 2:
+            return True
+        radius_m = self.fleet.brief.uas[uas].radius_m
+        return self.movers.spare_m(path_m, radius_m, self.margin_m) >= 0.0
+
+    def may_stop(self, uas: int, course: Course, followed: int) -> bool:
+        """Whether a course that ends in a hover is clear of what moves and what stands."""
+        path_m = np.ascontiguousarray(course.x[:, :3])
+        space = self.fleet.programs[uas].space
+        return self.is_clear(uas, course) and float(spare_of_rules_m(space, path_m, False)) >= 0.0
+
+    def comes_home(self, uas: int, x: FloatArray) -> bool:
+        """Whether it has charge for the way home, with its margin."""
+        return self.way_home.spare_dod(uas, x) >= 0.0
+
+    def apart(self, i: int, j: int, one: Course, other: Course) -> bool:
+        """Whether two courses keep the distance of the rules."""
+        return are_apart(self.fleet, i, j, one, other)
 
 
 class Safeguard:
@@ -54,9 +84,13 @@ class Safeguard:
         self, fleet: Fleet, world: WorldView, way_home: Range, moving_margin_m: float
     ) -> None:
         self._fleet, self._world = fleet, world
-        self._margin_m = moving_margin_m
-        self._way_home = way_home
-        self.backups: dict[int, Course] = {}
+        self._margin_m, self._way_home = moving_margin_m, way_home
+        self._supervisor = Supervisor(fleet.arena.vehicles, fleet.brief.dt_s)
+
+    @property
+    def backups(self) -> dict[int, Course]:
+        """The backup trajectories, by UAS; a UAS may be given one that was verified elsewhere."""
+        return self._supervisor.backups
 
     def chosen(
         self,
@@ -78,85 +112,11 @@ class Safeguard:
             course. UAS for which there is nothing are left out.
         """
         step, x = swarm.step, swarm.x
-        held = {}
-        for u in np.flatnonzero(swarm.status == FLYING).tolist():
-            if u in staying:
-                held[u] = _landing_here(self._fleet, u, step, x[u])
-                continue
-            backup = self.backups[u].rest(step) if u in self.backups else None
-            if backup is not None and self._holds(u, backup, x[u], movers):
-                held[u] = backup
-            elif u not in wanted and (stop := self._stop(u, step, x[u], movers)) is not None:
-                held[u] = stop
-        renewed = {u: self._continuation(u, course, movers) for u, course in wanted.items()}
-        fresh = {u: course for u, course in renewed.items() if course is not None}
-        together = held | fresh
-        if not self._all_apart(together):
-            together, fresh = self._one_by_one(held, fresh)
-        self.backups = together
-        return {u: (course, u in fresh) for u, course in together.items()}
-
-    def _one_by_one(
-        self, held: Mapping[int, Course], fresh: Mapping[int, Course]
-    ) -> tuple[dict[int, Course], dict[int, Course]]:
-        """New ones that are clear of all that is held or was taken before."""
-        together, taken = dict(held), {}
-        for _ in range(2):
-            for u, course in fresh.items():
-                others = {k: other for k, other in together.items() if k != u}
-                if u not in taken and all(
-                    are_apart(self._fleet, u, k, course, other) for k, other in others.items()
-                ):
-                    together[u] = taken[u] = course
-        return together, taken
-
-    def _all_apart(self, courses: Mapping[int, Course]) -> bool:
-        names = list(courses)
-        return all(
-            are_apart(self._fleet, i, j, courses[i], courses[j])
-            for k, i in enumerate(names)
-            for j in names[k + 1 :]
-        )
-
-    def _stop(self, uas: int, step: int, x: FloatArray, movers: Movers) -> Course | None:
-        """To brake at once, where that is clear of all that stands and of what moves."""
-        here = Course(step, np.ascontiguousarray(x[None]), np.zeros((0, 5)), False)
-        stop = braked(self._fleet, uas, here, 0)
-        path_m = np.ascontiguousarray(stop.x[:, :3])
-        is_clear = float(spare_of_rules_m(self._fleet.programs[uas].space, path_m, False)) >= 0.0
-        return stop if is_clear and self._is_clear(uas, stop, movers) else None
-
-    def _holds(self, uas: int, backup: Course, x: FloatArray, movers: Movers) -> bool:
-        """Whether what is left of a backup trajectory begins here and is clear of what is seen."""
-        if not backup.begins_at(x):
-            return False
-        return self._is_clear(uas, backup, movers)
-
-    def _is_clear(self, uas: int, course: Course, movers: Movers) -> bool:
-        steps = max(len(course.u), 1)
-        path_m = course.path_m(steps)
-        if course.lands and len(path_m) < 2:
-            return True
-        radius_m = self._fleet.brief.uas[uas].radius_m
-        return movers.spare_m(path_m, radius_m, self._margin_m) >= 0.0
-
-    def _continuation(self, uas: int, course: Course, movers: Movers) -> Course | None:
-        """A backup trajectory that begins with the course, None where there is none."""
-        if not len(course.u):
-            return None
-        if self._is_clear(uas, course, movers):
-            return course
-        space = self._fleet.programs[uas].space
-        for followed in range(min(_FOLLOWED, len(course.u)), 0, -1):
-            trial = braked(self._fleet, uas, course, followed)
-            path_m = np.ascontiguousarray(trial.x[:, :3])
-            if (
-                self._is_clear(uas, trial, movers)
-                and float(spare_of_rules_m(space, path_m, False)) >= 0.0
-                and self._way_home.spare_dod(uas, trial.x[-1]) >= 0.0
-            ):
-                return trial
-        return None
+        flying = {u: x[u] for u in np.flatnonzero(swarm.status == FLYING).tolist()}
+        landing = {u: _landing_here(self._fleet, u, step, x[u]) for u in staying}
+        checks = Seen(self._fleet, movers, self._margin_m, self._way_home)
+        follow = self._supervisor.renew(checks, step, flying, wanted, landing)
+        return {u: (course, u in follow) for u, course in self.backups.items()}
 
     def evade(
         self, uas: Collection[int], flown: Mapping[int, FloatArray], homeward: Collection[int]

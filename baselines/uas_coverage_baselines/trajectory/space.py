@@ -281,22 +281,6 @@ def spare_of_rules_m(space, path_m, lands):
 
 
 @allocating_kernel
-def apart_m(path_m, other_m, radius_m, half_height_m):
-    """Smallest distance of a path from a closed cylinder on another, between samples too: exact.
-
-    Beyond the end of the shorter path nothing is measured. Two UAS: radius and height 0.
-    """
-    smallest = np.inf
-    for n in range(min(len(path_m), len(other_m)) - 1):
-        a, b = path_m[n] - other_m[n], path_m[n + 1] - other_m[n + 1]
-        smallest = min(
-            smallest,
-            cylinder_clearance(radius_m, half_height_m, a[0], a[1], a[2], b[0], b[1], b[2]),
-        )
-    return smallest
-
-
-@allocating_kernel
 def spare_from_body_m(path_m, other_m, level_m, height_m):
     """Least distance beyond what a plan keeps from a body, between samples too."""
     smallest = np.inf

@@ -26,11 +26,11 @@ class Waiting(NamedTuple):
     """Which UAS could wait for what is blocked, and when it is visited at the latest.
 
     Attributes:
-        barred: (U, W) UAS that must not be the ones to wait: another one could wait longer.
+        forbidden: (U, W) UAS that must not be the ones to wait: another one could wait longer.
         latest: (W,) steps from now; negative where no UAS can wait any longer.
     """
 
-    barred: NDArray[np.bool_]
+    forbidden: NDArray[np.bool_]
     latest: NDArray[np.int64]
 
     def is_left_to_others(
@@ -44,8 +44,8 @@ class Waiting(NamedTuple):
             uncovered: (W,).
         """
         busy = [u for u, p in planned.items() if p.open_visits(step, uncovered).any()]
-        asked = uncovered & self.barred.any(axis=0) & (self.latest >= 0)
-        return bool(self.barred[busy][:, asked].all(axis=0).any())
+        asked = uncovered & self.forbidden.any(axis=0) & (self.latest >= 0)
+        return bool(self.forbidden[busy][:, asked].all(axis=0).any())
 
 
 def choose_waiting(
@@ -94,8 +94,8 @@ def opens_first(
         seed: Likewise.
     """
     others = moment.uncovered & ~unknown
-    task = fleet.task(replace(moment, uncovered=others), np.zeros(len(moment.x)))
-    order = improve_routes(task, empty_routes(task.n_uas), SearchEffort(moves), seed)
+    problem = fleet.problem(replace(moment, uncovered=others))
+    order = improve_routes(problem, empty_routes(problem.n_uas), SearchEffort(moves), seed)
     late_s = _OPENS_SHARE * float(order.seconds.mean())
     return round(max(_OPENS_AGAIN_S, late_s) / fleet.brief.dt_s)
 

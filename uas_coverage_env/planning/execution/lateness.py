@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from uas_coverage_env.geometry.round_shapes import outside_upright_m
 from uas_coverage_env.planning.execution.leg_model import DT_S, Followed
 from uas_coverage_env.scenario import Scenario
 
@@ -113,8 +114,7 @@ def apart_m(one_m: NDArray[np.float64], other_m: NDArray[np.float64]) -> NDArray
         one_m: (..., 3) [m].
         other_m: (..., 3) [m].
     """
-    away = one_m - other_m
-    return np.maximum(np.hypot(away[..., 0], away[..., 1]), np.abs(away[..., 2]))
+    return outside_upright_m(one_m - other_m)
 
 
 def encounters(a: Followed, b: Followed, distance_m: float) -> NDArray[np.intp]:

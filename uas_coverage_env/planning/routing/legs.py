@@ -26,6 +26,7 @@ from uas_coverage_env.autopilot.belief import (
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.planning.execution.leg_model import Autopilot
+from uas_coverage_env.planning.routing.clock import CUTTING, STOPPING
 from uas_coverage_env.vehicle.range import (
     ROUTED,
     SpeedLimits,
@@ -44,10 +45,6 @@ _NEIGHBOURS = 24
 _FROM_HERE = 64
 """Likewise from where a UAS is."""
 _AT_ONCE = 2**20  # straight legs: more than so many are computed in parts, for the memory
-_STOP_DEG = np.array([0.0, 10.0, 25.0, 90.0, 180.0])
-_STOP_SHARE = np.array([0.0, 0.0, 0.6, 1.0, 1.1])
-"""What an autopilot loses in a corner, in corners of 90 degrees; a few degrees are no corner."""
-_COSINES = np.linspace(-1.0, 1.0, 257)
 _OCTAGON = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
 
 
@@ -68,8 +65,8 @@ class Legs:
         acceleration_mps2: (U,) horizontal, what a turn uses of it on average.
         turn_s: (U, W) time that the radius of a waypoint is worth; where an autopilot flies, what
             a corner of 90 degrees costs.
-        turn_of_cosine: (257,) what turning at a waypoint costs, in `turn_s`, by the cosine of the
-            angle from -1 to 1; None: of flights that cut through waypoints.
+        turn_of_cosine: What turning at a waypoint costs, in `turn_s`, by the cosine of the angle
+            from -1 to 1: of flights that cut through waypoints, or of an autopilot.
     """
 
     def __init__(self, brief: MissionBrief) -> None:
@@ -90,13 +87,12 @@ class Legs:
         )
         radius_m = np.array([w.radius_m for w in brief.waypoints])
         self.turn_s = radius_m / self.speed_mps[:, None]
-        self.turn_of_cosine: FloatArray | None = None
+        self.turn_of_cosine = CUTTING
         if brief.execution is not None:
             corner_m = brief.execution.corner_m
             stops_s = [Autopilot.of(vehicle, corner_m).turn_s for vehicle in brief.vehicles]
             self.turn_s = np.tile(np.array(stops_s)[:, None], len(radius_m))
-            turned_deg = np.degrees(np.arccos(_COSINES))
-            self.turn_of_cosine = np.interp(turned_deg, _STOP_DEG, _STOP_SHARE)
+            self.turn_of_cosine = STOPPING
         n = len(self.waypoints_m)
         nearest = min(_NEIGHBOURS, n - 1)
         found = KDTree(self.waypoints_m).query(self.waypoints_m, nearest + 1)[1]

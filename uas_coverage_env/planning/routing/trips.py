@@ -2,13 +2,14 @@
 
 A search for flights that are over soon fills every charge, and plans the last of them for what
 happens to be left. Here all flights are planned at once: the search is the same, over one route for
-each charge of a UAS, flown one after the other (`RoutingTask.packs`).
+each charge of a UAS, flown one after the other (a multi-trip routing problem).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -17,13 +18,13 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.routing.problem import RoutingProblem
 from uas_coverage_env.planning.routing.search import (
     Routes,
     SearchEffort,
     empty_routes,
     improve_routes,
 )
-from uas_coverage_env.planning.routing.task import GROUND_S, RoutingTask
 from uas_coverage_env.simulation.world import initial_state
 from uas_coverage_env.world import SwarmState
 from uas_coverage_env.world.packs import pack_records, swaps_alone
@@ -67,7 +68,7 @@ class FreshPacks:
 
     Attributes:
         left: (U,) of each UAS.
-        task: The problem of all UAS at home with fresh packs now, those that have none left out.
+        problem: That of all UAS at home with fresh packs now, those that have none left out.
         ground_s: (U,) on the ground until the next take-off, for UAS that are there already.
         swap_s: (U,) likewise for all others, and from then on.
         until_s: From now to the end of the mission at the latest.
@@ -77,7 +78,7 @@ class FreshPacks:
     """
 
     left: IntArray
-    task: Callable[[], RoutingTask]
+    problem: Callable[[], RoutingProblem]
     ground_s: FloatArray
     swap_s: FloatArray
     until_s: float
@@ -90,7 +91,7 @@ class FreshPacks:
         packs: Packs | None,
         swarm: SwarmState,
         until_s: float,
-        task: Callable[[FloatArray, BoolArray], RoutingTask],
+        problem: Callable[[FloatArray, BoolArray], RoutingProblem],
         budget_share: float = 1.0,
         is_planned: BoolArray | None = None,
     ) -> FreshPacks | None:
@@ -100,7 +101,7 @@ class FreshPacks:
             packs: Of the mission.
             swarm: What is seen.
             until_s: From now to the end of the mission at the latest.
-            task: Makes the routing problem of states (U, 14), of UAS (U,) that may work.
+            problem: Makes the routing problem of states (U, 14), of UAS (U,) that may work.
             budget_share: See the attribute.
             is_planned: Likewise.
         """
@@ -108,7 +109,7 @@ class FreshPacks:
         if packs is None or not left.any():
             return None
         ground_s = np.where(swarm.status == FLYING, packs.swap_s, swarm.ground_s)
-        fresh = partial(task, packs.x, left > 0)
+        fresh = partial(problem, packs.x, left > 0)
         return cls(left, fresh, ground_s, packs.swap_s, until_s, budget_share, is_planned)
 
     def shorter(self, share: float, uas: Sequence[int]) -> FreshPacks:
@@ -120,7 +121,7 @@ class FreshPacks:
 
 
 def improve_trips(
-    task: RoutingTask,
+    problem: RoutingProblem,
     order: Routes,
     effort: SearchEffort,
     seed: int,
@@ -133,7 +134,7 @@ def improve_trips(
     flown all its flights, with the swaps between them, and the weighted sum of all flights.
 
     Args:
-        task: the routing problem of the charges that are in.
+        problem: the routing problem of the charges that are in.
         order: where to begin; its `trips` too.
         effort: how much to search.
         seed: of the search.
@@ -145,27 +146,52 @@ def improve_trips(
     """
     found, now = order, None
     if fresh is None or not order.trips:
-        found = now = improve_routes(task, order, effort, seed)
+        found = now = improve_routes(problem, order, effort, seed)
         if fresh is None or not len(now.left_out):
             return now
-    later, most = fresh.task(), int(fresh.left.max())
+    later, most = fresh.problem(), int(fresh.left.max())
     n_trips = min(_trips_at_first(found) + (effort.moves > 0), most)
-    begin = order if order.trips else empty_routes(task.n_uas)
-    best = _with_trips(task, later, fresh, n_trips, begin, effort, seed)
+    begin = order if order.trips else empty_routes(problem.n_uas)
+    best = _with_trips(problem, later, fresh, n_trips, begin, effort, seed)
     while effort.moves and n_trips < most and len(best.left_out):
         n_trips += 1
-        more = _with_trips(task, later, fresh, n_trips, begin, effort, seed)
+        more = _with_trips(problem, later, fresh, n_trips, begin, effort, seed)
         if len(more.left_out) >= len(best.left_out):
             break
         best = more
     if effort.moves and len(best.left_out) and fresh.budget_share < 1.0:
         share = min(fresh.budget_share + _AT_LAST, 1.0)
         more = replace(fresh, budget_share=share)
-        far = _with_trips(task, later, more, n_trips, begin, effort, seed)
+        far = _with_trips(problem, later, more, n_trips, begin, effort, seed)
         best = far if len(far.left_out) < len(best.left_out) else best
     if best.mission_s <= fresh.until_s:
         return best
-    return now or improve_routes(task, order, effort, seed)
+    return now or improve_routes(problem, order, effort, seed)
+
+
+def search_orders(
+    problem: RoutingProblem,
+    order: Routes,
+    searches: Sequence[tuple[SearchEffort, int]],
+    fresh: FreshPacks | None = None,
+    threads: int = 1,
+) -> list[Routes]:
+    """What several searches find from a given order, the cheapest first.
+
+    Args:
+        problem: the routing problem.
+        order: where each begins.
+        searches: effort and seed of each.
+        fresh: packs that are left.
+        threads: searches side by side; what they find is the same.
+    """
+
+    def searched(search: tuple[SearchEffort, int]) -> Routes:
+        return improve_trips(problem, order, *search, fresh)
+
+    with ThreadPoolExecutor(threads) as side_by_side:  # the search frees the GIL
+        found = list(side_by_side.map(searched, searches))
+    return sorted(found, key=lambda each: each.cost_s)
 
 
 def _trips_at_first(order: Routes) -> int:
@@ -177,8 +203,8 @@ def _trips_at_first(order: Routes) -> int:
 
 
 def _with_trips(
-    task: RoutingTask,
-    later: RoutingTask,
+    problem: RoutingProblem,
+    later: RoutingProblem,
     fresh: FreshPacks,
     n_trips: int,
     order: Routes,
@@ -186,12 +212,13 @@ def _with_trips(
     seed: int,
 ) -> Routes:
     """An order with at most so many flights of each UAS with fresh packs."""
-    n_uas, works = task.n_uas, task.budget_s > -np.inf
+    n_uas = problem.n_uas
     uas = np.repeat(np.arange(n_uas), 1 + np.minimum(fresh.left, n_trips))
     follows = np.append(False, uas[1:] == uas[:-1])
-    is_fresh = works & (task.budget_s >= _FRESH * later.budget_s)
-    flights = _flights(task, later, fresh, uas, follows)
-    open_ = np.zeros(task.n_waypoints, np.bool_)
+    charged = problem.uas["budget_s"] >= _FRESH * later.uas["budget_s"]
+    is_fresh = problem.may_fly & charged
+    flights = _flights(problem, later, fresh, uas, follows)
+    open_ = np.zeros(problem.n_waypoints, np.bool_)
     open_[flights.open_waypoints] = True
     begin: list[IntArray] = []
     for u in range(n_uas):
@@ -204,11 +231,12 @@ def _with_trips(
     first = Routes((*begin,), order.left_out, np.zeros(len(uas)), np.inf)
     if fresh.is_planned is not None and fresh.is_planned.any():
         visited = np.concatenate(begin)
-        kept = replace(flights, open_waypoints=visited[open_[visited]])
+        kept = flights.replace(open_waypoints=visited[open_[visited]])
         kept_s = improve_routes(kept, first, SearchEffort(0), 0).seconds
         lasts = ~follows & fresh.is_planned[uas]
-        longer_s = np.maximum(flights.budget_s, kept_s)
-        flights = replace(flights, budget_s=np.where(lasts, longer_s, flights.budget_s))
+        budget_s = flights.uas["budget_s"]
+        longer_s = np.maximum(budget_s, kept_s)
+        flights = flights.replace(budget_s=np.where(lasts, longer_s, budget_s))
     found = improve_routes(flights, first, replace(effort, by_pieces=True), seed)
     routes: list[IntArray] = []
     trips_of: list[tuple[IntArray, ...]] = []
@@ -220,8 +248,7 @@ def _with_trips(
         routes.append(route)
         trips_of.append((*trips,))
     # as long as they take, and as long as the UAS is on the ground before
-    assert flights.packs is not None
-    ground_s = np.where(found.seconds > 0.0, flights.packs[:, GROUND_S], 0.0)
+    ground_s = np.where(found.seconds > 0.0, flights.uas["ground_s"], 0.0)
     home_s = np.bincount(uas, found.seconds + ground_s)
     return replace(
         found,
@@ -233,12 +260,12 @@ def _with_trips(
 
 
 def _flights(
-    task: RoutingTask,
-    later: RoutingTask,
+    problem: RoutingProblem,
+    later: RoutingProblem,
     fresh: FreshPacks,
     uas: IntArray,
     follows: BoolArray,
-) -> RoutingTask:
+) -> RoutingProblem:
     """The problem of all flights: with the charge that is in, and with fresh packs after it."""
 
     def of_each(now: NDArray, then: NDArray) -> NDArray:
@@ -246,33 +273,20 @@ def _flights(
         rows[follows] = then[uas[follows]]
         return rows
 
-    barred = task.barred
-    if barred is not None:
-        barred = of_each(barred, np.zeros_like(barred))
-    lands_before = np.append(False, follows[:-1]) | (task.budget_s > -np.inf)[uas]
+    may_fly, now_s, later_s = problem.may_fly, problem.uas["budget_s"], later.uas["budget_s"]
+    flights = of_each(problem.uas, later.uas)
+    lands_before = np.append(False, follows[:-1]) | may_fly[uas]
     ground_s = np.where(lands_before, fresh.swap_s[uas], fresh.ground_s[uas])
-    ground_s = np.where(follows, ground_s, 0.0)
-    has_charge = task.budget_s > _NO_RETURN * later.budget_s
-    return replace(
-        task,
-        open_waypoints=np.union1d(task.open_waypoints, later.open_waypoints),
-        first_s=of_each(task.first_s, later.first_s),
-        kind=task.kind[uas],
-        home_s=task.home_s[uas],
-        idle_s=of_each(task.idle_s, np.zeros(task.n_uas)),
-        position_m=of_each(task.position_m, later.position_m),
-        velocity_mps=of_each(task.velocity_mps, later.velocity_mps),
-        speed_mps=task.speed_mps[uas],
-        acceleration_mps2=task.acceleration_mps2[uas],
-        start_m=task.start_m[uas],
-        turn_s=task.turn_s[uas],
-        budget_s=fresh.budget_share * of_each(task.budget_s, later.budget_s),
-        barred=barred,
-        packs=np.column_stack(
-            [
-                uas.astype(np.float64),
-                ground_s,
-                np.where(~follows & has_charge[uas], _FOR_NOTHING_S, 0),
-            ]
-        ),
+    has_charge = now_s > _NO_RETURN * later_s
+    flights["idle_s"][follows] = 0.0
+    flights["budget_s"] *= fresh.budget_share
+    flights["ground_s"] = np.where(follows, ground_s, 0.0)
+    flights["again_s"] = np.where(~follows & has_charge[uas], _FOR_NOTHING_S, 0)
+    return problem.replace(
+        open_waypoints=np.union1d(problem.open_waypoints, later.open_waypoints),
+        uas=flights,
+        first_s=of_each(problem.first_s, later.first_s),
+        home_s=problem.home_s[uas],
+        turn_s=problem.turn_s[uas],
+        forbidden=of_each(problem.forbidden, np.zeros_like(problem.forbidden)),
     )

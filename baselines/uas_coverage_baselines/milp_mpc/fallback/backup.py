@@ -9,9 +9,9 @@ of the fence's margin, of the other UAS and of moving obstacles at their last ve
 terminal set. After one step of it the UAS are where it says (it is computed with the model that the
 world flies), and what is left of it is a backup trajectory again. So once there is one there is one
 at every later decision, whether a solver says anything or not: what is left of the last, until a
-new plan brings its own. Two things outside it can end the chain: a moving obstacle that changes its
-velocity by more than its margin covers, and a plant that is not the model; `still_holds` asks for
-both at every decision.
+new plan brings its own (`planning.backup`). Two things outside it can end the chain: a moving
+obstacle that changes its velocity by more than its margin covers, and a plant that is not the
+model; `still_holds` asks for both at every decision.
 
 The battery. The end of a backup trajectory leaves charge to fly home from its hover, so that
 DoD_max holds along all of it (the depth of discharge only grows). The plan's own end leaves an
@@ -22,26 +22,22 @@ longer decides what is flown: a rule that then refused the way home would keep i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.braking import brake
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import short_s
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
-from uas_coverage_env.vehicle import (
-    compile_vehicle,
-)
+from uas_coverage_env.planning.backup import Course, Supervisor
+from uas_coverage_env.vehicle import compile_vehicle
 
 FloatArray = NDArray[np.float64]
-BRAKING_S = 14.0
-"""Braking from any speed has ended after this time."""
 
 
 def backup_trajectory(
@@ -51,94 +47,81 @@ def backup_trajectory(
 
     It is clear of everything, and each UAS whose charge suffices to come home now has enough in
     its hover, too. One UAS after the other follows its plan as long as it is clear of those before
-    it; where that leaves one without, all follow theirs equally long.
+    it; where that leaves one without, all follow theirs equally long (`Supervisor.teams`).
     """
-    steps = plan.u.shape[1] + int(np.ceil(BRAKING_S / dt_s))
-    candidates = _Candidates(problem, plan, dt_s, steps, blocks)
-    longest = candidates.one_after_the_other()
-    for followed in [longest, *([n] * problem.n_uas for n in range(plan.u.shape[1], 0, -1))]:
-        if followed is not None and (result := candidates.together(followed)) is not None:
+    records = [compile_vehicle(vehicle, dt_s)[()] for vehicle in problem.vehicles]
+    supervisor = Supervisor(records, dt_s)
+    longer = replace(problem, moving=prolonged(problem, plan.u.shape[1] + supervisor.braking_steps))
+    checks = _ByBlocks(problem, longer, blocks, supervisor.braking_steps)
+    courses = {uas: course_of(plan, name) for uas, name in enumerate(problem.names)}
+    for followed, team in supervisor.teams(checks, courses):
+        result = _joined(problem, plan, followed, team)
+        if trouble(longer, result, blocks) is None:
             return result
     return None
 
 
-class _Candidates:
-    """What each UAS flies that follows a plan for some steps and brakes then."""
+def course_of(plan: Plan, name: str) -> Course:
+    """What one UAS flies by a plan, from now on."""
+    row = plan.of(name)
+    return Course(0, plan.x[row], plan.u[row], False)
+
+
+class _ByBlocks:
+    """What the supervisor asks of a decision: its geometry and its blocks, for one UAS alone.
+
+    Args:
+        problem: the decision.
+        longer: the same, what moves predicted to the end of braking.
+        blocks: of the OCP.
+        braking_steps: after which a braked plan hovers.
+    """
 
     def __init__(
         self,
         problem: PlanningProblem,
-        plan: Plan,
-        dt_s: float,
-        steps: int,
+        longer: PlanningProblem,
         blocks: Sequence[Block],
+        braking_steps: int,
     ) -> None:
-        self._problem, self._plan, self._steps = problem, plan, steps
-        self._blocks = blocks
-        self._braking_steps = steps - plan.u.shape[1]
-        self._longer = replace(problem, moving=prolonged(problem, steps))
-        self._records = [compile_vehicle(vehicle, dt_s)[()] for vehicle in problem.vehicles]
+        self._problem, self._blocks, self._braking_steps = problem, blocks, braking_steps
         swarm = range(problem.n_uas)
-        self._alone = [self._longer.only(uas) for uas in swarm]
+        self._alone = [longer.only(uas) for uas in swarm]
         self._in_time = [short_s(problem, uas, problem.x0[uas]) <= 0.0 for uas in swarm]
 
-    def one_after_the_other(self) -> list[int] | None:
-        """How long each follows its plan: as long as it is clear of those before it."""
-        paths: list[FloatArray] = []
-        followed: list[int] = []
-        for uas in range(self._problem.n_uas):
-            for n in range(self._plan.u.shape[1], 0, -1):
-                x, u = self._flown(uas, n, self._steps)
-                if self._fails_alone(uas, x, u, n) or any(
-                    trouble_between(self._problem, uas, other, x[:, :3], path) is not None
-                    for other, path in enumerate(paths)
-                ):
-                    continue
-                paths.append(x[:, :3])
-                followed.append(n)
-                break
-            else:
-                return None
-        return followed
-
-    def together(self, followed: list[int]) -> Plan | None:
-        """The flights of all, where nothing is wrong with them."""
-        plan, steps = self._plan, max(followed) + self._braking_steps
-        flown = [self._flown(uas, n, steps) for uas, n in enumerate(followed)]
-        if not all(self._comes_home(uas, x[-1]) for uas, (x, _) in enumerate(flown)):
-            return None
-        covers = np.zeros((len(flown), steps, plan.covers.shape[2]), bool)
-        for uas, (name, n) in enumerate(zip(self._problem.names, followed, strict=True)):
-            covers[uas, :n] = plan.covers[plan.of(name), :n]
-        x, u = (np.array([flight[k] for flight in flown]) for k in range(2))
-        result = Plan(self._problem.names, x, u, covers, plan.objective, -np.inf)
-        return result if trouble(self._longer, result, self._blocks) is None else None
-
-    def _flown(self, uas: int, followed: int, steps: int) -> tuple[FloatArray, FloatArray]:
-        """States (steps+1, 14) and inputs (steps, 5) of one UAS."""
-        row = self._plan.of(self._problem.names[uas])
-        x, u = self._plan.x[row, : followed + 1], self._plan.u[row, :followed]
-        states, inputs = brake(self._records[uas], x[-1], steps - followed)
-        return np.vstack([x, states]), np.vstack([u, inputs])
-
-    def _fails_alone(self, uas: int, x: FloatArray, u: FloatArray, followed: int) -> bool:
-        end = followed + self._braking_steps
-        alone = Plan(
-            *(self._alone[uas].names, x[None, : end + 1], u[None, :end]),
-            *(np.zeros((1, end, self._problem.n_scenario_waypoints), bool), 0.0, -np.inf),
-        )
+    def may_stop(self, uas: int, course: Course, followed: int) -> bool:
+        """Whether nothing is wrong with it, and braking keeps the limits."""
+        problem, end = self._problem, followed + self._braking_steps
+        x, u = course.x[: end + 1], course.u[:end]
+        covers = np.zeros((1, end, problem.n_scenario_waypoints), bool)
+        alone = Plan(self._alone[uas].names, x[None], u[None], covers, 0.0, -np.inf)
         # a plan's end may leave braking no way to keep the limits
-        problem, braking = self._problem, x[followed + 1 : end + 1]
-        comes_home = self._comes_home(uas, x[end])
-        return (
-            not comes_home
-            or exceeds_limits(problem.vehicles[uas], problem.norm_bounds[uas], braking)
+        vehicle, bounds = problem.vehicles[uas], problem.norm_bounds[uas]
+        return not (
+            exceeds_limits(vehicle, bounds, x[followed + 1 :])
             or trouble(self._alone[uas], alone, self._blocks) is not None
         )
 
-    def _comes_home(self, uas: int, x: FloatArray) -> bool:
+    def comes_home(self, uas: int, x: FloatArray) -> bool:
+        """Whether its charge suffices; one that is late whatever it does is not held up."""
         late = short_s(self._problem, uas, x, allowance=False) > 0.0
         return not (late and self._in_time[uas])
+
+    def apart(self, i: int, j: int, one: Course, other: Course) -> bool:
+        """Whether two keep their separation."""
+        return trouble_between(self._problem, i, j, one.x[:, :3], other.x[:, :3]) is None
+
+
+def _joined(
+    problem: PlanningProblem, plan: Plan, followed: Mapping[int, int], team: Mapping[int, Course]
+) -> Plan:
+    """One plan of all backups; a waypoint counts as covered while its UAS follows its plan."""
+    steps = len(team[0].u)
+    covers = np.zeros((problem.n_uas, steps, plan.covers.shape[2]), bool)
+    for uas, name in enumerate(problem.names):
+        covers[uas, : followed[uas]] = plan.covers[plan.of(name), : followed[uas]]
+    x, u = np.array([c.x for c in team.values()]), np.array([c.u for c in team.values()])
+    return Plan(problem.names, x, u, covers, plan.objective, -np.inf)
 
 
 def still_holds(problem: PlanningProblem, backup: Plan, blocks: Sequence[Block] = OCP) -> bool:

@@ -15,10 +15,12 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, prolonged
+from uas_coverage_baselines.milp_mpc.fallback.backup import prolonged
 from uas_coverage_baselines.milp_mpc.model.flown import pushed
 from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
+from uas_coverage_env.geometry.round_shapes import outside_upright_m
+from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import compile_vehicle
 
 FloatArray = NDArray[np.float64]
@@ -48,8 +50,7 @@ def evasion(problem: PlanningProblem, dt_s: float) -> Plan | None:
         for other in range(problem.n_uas):
             if other != uas:
                 apart = _dense(x[..., :3] - flights[other][0][chosen[other], :, :3])
-                away = np.maximum(np.hypot(apart[..., 0], apart[..., 1]), np.abs(apart[..., 2]))
-                cost += _squared(problem.separation_m[uas, other] - away)
+                cost += _squared(problem.separation_m[uas, other] - outside_upright_m(apart))
         moved_m = np.linalg.norm(x[:, -1, :3] - x[0, -1, :3], axis=1)
         chosen[uas] = int(np.lexsort((moved_m, cost.round(6)))[0])
     if not any(chosen):
@@ -90,9 +91,9 @@ def _too_close(problem: PlanningProblem, uas: int, x: FloatArray) -> FloatArray:
     ):
         cost += _squared(clearance - hull.signed_distance(path))
     for moving, clearance in zip(problem.moving, problem.moving_clearance_m[uas], strict=True):
-        away = np.abs(path - _dense(moving.position_m[None, : x.shape[1]]))
-        level = np.hypot(away[..., 0], away[..., 1]) - moving.radius_m
-        cost += _squared(clearance - np.maximum(level, away[..., 2] - moving.half_height_m))
+        away = path - _dense(moving.position_m[None, : x.shape[1]])
+        size_m = moving.radius_m, moving.half_height_m
+        cost += _squared(clearance - outside_upright_m(away, *size_m))
     return cost
 
 

@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.braking import brake
+from uas_coverage_baselines.milp_mpc.fallback.backup import course_of
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
+from uas_coverage_env.planning.backup import Course, braked
 from uas_coverage_env.vehicle import compile_vehicle
 
 FloatArray = NDArray[np.float64]
@@ -40,21 +41,19 @@ def fallback_plans(
     appraisal = Appraisal(problem.only(uas), blocks)
     name, N = problem.names[uas], problem.horizon
     record = compile_vehicle(problem.vehicles[uas], dt_s)[()]
-    states, inputs = brake(record, problem.x0[uas], N)
+    here = Course(0, problem.x0[uas, None], np.zeros((0, 5)), False)
     nothing = np.zeros((N, problem.n_scenario_waypoints), bool)
-    plans = [_plan(appraisal, name, np.vstack([problem.x0[uas], states]), inputs, nothing)]
+    plans = [_plan(appraisal, name, braked(record, here, 0, N), nothing)]
     if backup is not None and name in backup.names:
-        row = backup.of(name)
-        x, u, covers = backup.x[row, : N + 1], backup.u[row, :N], backup.covers[row, :N]
-        states, inputs = brake(record, x[-1], N - len(u))
-        x, u = np.vstack([x, states]), np.vstack([u, inputs])
-        covers = np.vstack([covers, nothing[: N - len(covers)]])
-        plans.insert(0, _plan(appraisal, name, x, u, covers))
+        left, covers = course_of(backup, name), backup.covers[backup.of(name), :N]
+        followed = min(len(left.u), N)
+        covers = np.vstack([covers, nothing[followed:]])
+        plans.insert(
+            0, _plan(appraisal, name, braked(record, left, followed, N - followed), covers)
+        )
     return plans
 
 
-def _plan(
-    appraisal: Appraisal, name: str, x: FloatArray, u: FloatArray, covers: NDArray[np.bool_]
-) -> Plan:
-    plan = Plan((name,), x[None], u[None], covers[None], 0.0, -np.inf)
+def _plan(appraisal: Appraisal, name: str, course: Course, covers: NDArray[np.bool_]) -> Plan:
+    plan = Plan((name,), course.x[None], course.u[None], covers[None], 0.0, -np.inf)
     return replace(plan, objective=appraisal.objective(plan))

@@ -12,6 +12,8 @@ class Reason(StrEnum):
 
     NO_TIME = "no time"
     """The time was up before a program had a solution."""
+    CUT_SHORT = "cut short"
+    """No fallback: there is a new plan, but the time limit has ended the search for it."""
     NO_PLAN = "no plan"
     """No program has a solution, or none that may be flown."""
     NO_TEAM = "no joint plan"

@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.braking import brake
-from uas_coverage_baselines.milp_mpc.fallback.backup import BRAKING_S, prolonged
+from uas_coverage_baselines.milp_mpc.fallback.backup import course_of, prolonged
 from uas_coverage_baselines.milp_mpc.model.appraisal import trouble
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
@@ -28,7 +27,8 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.approach import carefully, with_free_aims
-from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
+from uas_coverage_env.planning.backup import Course, braked
+from uas_coverage_env.planning.reserves import BRAKING_S, ROUTE_HOME_RESERVE
 from uas_coverage_env.vehicle import compile_vehicle, lpv_step
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
@@ -188,12 +188,11 @@ class RouteFollower:
             if row == uas:
                 flown.append(self._flown(problem, row, pursued, steps, route))
                 continue
-            x, u = problem.x0[row, None], np.zeros((0, 5))
-            if backup is not None:
-                x, u = backup.x[backup.of(name)], backup.u[backup.of(name)]
+            here = Course(0, problem.x0[row, None], np.zeros((0, 5)), False)
+            left = here if backup is None else course_of(backup, name)
             record = compile_vehicle(problem.vehicles[row], dt_s)[()]
-            states, inputs = brake(record, x[-1], steps - len(u))
-            flown.append((np.vstack([x, states]), np.vstack([u, inputs])))
+            held = braked(record, left, len(left.u), steps - len(left.u))
+            flown.append((held.x, held.u))
         x, u = (np.array([flight[k] for flight in flown]) for k in range(2))
         covers = np.zeros((problem.n_uas, steps, problem.n_scenario_waypoints), bool)
         return Plan(problem.names, x, u, covers, 0.0, -np.inf)

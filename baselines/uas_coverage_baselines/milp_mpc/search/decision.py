@@ -1,12 +1,16 @@
-"""One decision: from the problem to a verified plan within the time limit.
+"""One decision: from the problem to a verified plan, within an amount of work.
 
 UAS couple only where they may cover the same waypoint or come close. So each UAS's own OCP is
 solved first, restricted to the neighbourhood of a trajectory: what is left of its previous plan,
 and the constructed trajectories that make the best teams (programs of some hundredths of a second,
 solved side by side). A UAS without a plan then gets wider programs, and after these a plan that
 needs no solver (`fallback.plans`). The best team of the plans found is checked as a whole; then the
-whole OCP starts from it with the time that is left, a share of which is kept for it, for the bound
+whole OCP starts from it with the work that is left, a share of which is kept for it, for the bound
 and what it still finds.
+
+Work is counted in what every machine repeats (nodes, simplex iterations, sizes of programs), and in
+an order that does not depend on threads, so that a decision is the same on every machine. A time
+limit is a cap that is off by default.
 """
 
 from __future__ import annotations
@@ -23,10 +27,7 @@ from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
-from uas_coverage_baselines.milp_mpc.search.restricted import (
-    NARROW,
-    WIDE,
-)
+from uas_coverage_baselines.milp_mpc.search.restricted import ALONG, NARROW, WIDE
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_baselines.milp_mpc.search.team_search import Effort, TeamSearch
 from uas_coverage_baselines.milp_mpc.search.trajectories import (
@@ -74,7 +75,7 @@ def decide(
             uas: side_by_side.submit(construct, problem, uas, dt_s, blocks=blocks)
             for uas in planned
         }
-        round_robin.writing_s = search.prepare(planned) / len(planned)
+        search.prepare(planned)
         pools = [
             constructing[uas].result()
             if uas in planned
@@ -85,24 +86,16 @@ def decide(
         if previous is not None:
             candidates.insert(0, left_over(problem, previous, dt_s, blocks))
         tasks = [task for task in _unique_tasks(candidates) if task[0] in planned]
-        if problem.tours:
-            per_uas_s = search.time_left_s() * effort.threads / len(planned)
-            polished = side_by_side.map(lambda uas: search.polished(uas, tasks, per_uas_s), planned)
-            for uas, plans in zip(planned, polished, strict=True):
-                search.collect(uas, plans)
-        else:
-            found = side_by_side.map(lambda task: search.refined(task[0], task[1], NARROW), tasks)
-            for (uas, _), plan in zip(tasks, found, strict=True):
-                search.collect(uas, [plan])
-        tasks = [
+        search.refine(tasks, ALONG if problem.tours else NARROW, side_by_side)
+        resorts = [
             task
             for uas in planned
             if not search.has_plan(uas)
             for task in _last_resorts(problem, uas, tasks, left[uas])
         ]
-        found = side_by_side.map(lambda task: search.refined(task[0], task[1], WIDE), tasks)
-        for (uas, _), plan in zip(tasks, found, strict=True):
-            search.collect(uas, [plan])
+        search.refine(resorts, WIDE, side_by_side)
+    if search.programs:
+        round_robin.work_of_one = search.work / search.programs
     search.combine(spare)
     search.improve()
     return search.outcome

@@ -1,6 +1,6 @@
-"""Round-robin replanning: the UAS that are planned for where there is no time for all.
+"""Round-robin replanning: the UAS that are planned for where the work does not suffice for all.
 
-Many UAS share the time of one decision. A UAS that is not planned for goes on along its last
+Many UAS share the work of one decision. A UAS that is not planned for goes on along its last
 verified plan and its backup trajectory, around which the others plan; so a plan lasts several
 decisions, and no UAS waits for ever.
 """
@@ -11,10 +11,10 @@ from collections.abc import Collection, Sequence
 
 
 class RoundRobin:
-    """The order in which UAS are planned for, where the time does not suffice for all."""
+    """The order in which UAS are planned for, where the work does not suffice for all."""
 
     def __init__(self) -> None:
-        self.writing_s = 0.0  # what writing one program took in the last decision
+        self.work_of_one = 0.05  # what solving one program took in the last decision
         self._last: dict[str, int] = {}
         self._decision = 0
 

@@ -1,9 +1,10 @@
-"""The programs of one decision, the best verified plan so far, and the time that is left."""
+"""The programs of one decision, the best verified plan so far, and the work that is left."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,6 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
 from uas_coverage_baselines.milp_mpc.search.restricted import (
-    ALONG,
     TIGHTEST,
     Neighbourhood,
     RestrictedMilp,
@@ -31,7 +31,6 @@ from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
 from uas_coverage_baselines.milp_mpc.solvers.interface import (
     Solution,
     SolverError,
-    SolveStatus,
     Start,
 )
 
@@ -40,42 +39,46 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Effort:
-    """How much work a decision may take.
+    """How much work a decision may take, counted in what every machine repeats.
 
     Attributes:
-        time_limit_s: wall clock of the whole decision.
-        threads: how many restricted programs are solved side by side.
-        deterministic: limits by nodes instead of the clock, so that the same state gives the
-            same plan on any machine.
+        work: of the decision's programs (`work_of`); with 1 it takes a second of a quiet core.
+        threads: how many restricted programs are solved side by side; changes no result.
         teams: how many constructed teams are refined.
         at_once: how many UAS are planned for, at most; the others go on with what they have.
         solver: one of `SOLVERS`.
         joint: the form of the joint program; None where it is not to be solved.
+        time_limit_s: wall clock at which the decision ends all the same; None for none. Where it
+            strikes, flights differ from machine to machine.
     """
 
-    time_limit_s: float = 1.0
+    work: float = 1.0
     threads: int = 2
-    deterministic: bool = False
     teams: int = 6
     at_once: int = 64
     solver: str = "highs"
     joint: str | None = TIGHTEST
+    time_limit_s: float | None = None
 
 
-_RESERVE = 0.15  # share of the time limit kept for verification and whatever is late
-_RESTRICTED_SHARE = 0.3  # of the time limit, for one restricted program at most
-_STARTS, _POLISHES = 2, 3  # programs along a UAS's tour: around flights, then around the best
-_WORTH_POLISHING = 0.05
-_WORTH_STARTING_S = 0.05  # less time than this gives no first plan
-_WORTHWHILE_S = 0.12  # nor this a better one
-_PER_UAS_S = 0.15  # of one thread: with less for each, some UAS wait for the next decision
-_PER_WRITING = 6.0  # a busy machine takes longer: what writing a program took says so
+_LATE = 0.15  # share of the time limit kept for verification and whatever is late
+_WORTH_STARTING_S = 0.05  # less time than this gives no plan
 _TEAMS_VERIFIED = 6
-_RESTRICTED_NODES = 60
-_ALONE_NODES = 30
-_JOINT_NODES = 1  # the root: its bound and what comes of the start, in about a second
-_JOINT_WHOLE = 2000  # binaries: the root of a larger program takes many seconds
-_JOINT_SHARE = 0.3  # of the time limit, for the joint program once each UAS has a plan
+_NODES, _ALONE_NODES = 60, 30
+_JOINT_NODES = 1  # the root: its bound and what comes of the start
+_JOINT_SHARE = 0.6  # of the work: the most that is kept for the joint program
+_AT_LEAST, _AT_MOST = 1.1, 2.0  # of the work: with which it is solved, with which all ends
+_WAVE = 4  # programs after which the work is counted, whatever the number of threads
+# 1 is 0.85 s of a quiet core (docs/solvers.md); the rest of a second is for all but programs
+_PER_ENTRY, _PER_ITERATION_AND_ROW = 6e-7, 3.5e-8
+_PROGRAMS_EACH = 2  # at least, of a UAS that is planned for
+
+
+def work_of(program: RestrictedMilp, iterations: int) -> float:
+    """What solving a program takes: presolve by its entries, each iteration by its rows."""
+    built = program.built
+    simplex = _PER_ITERATION_AND_ROW * iterations * len(built.row_lower)
+    return _PER_ENTRY * len(built.column) + simplex
 
 
 class TeamSearch:
@@ -93,19 +96,23 @@ class TeamSearch:
         self._alone = [problem.only(uas) for uas in range(problem.n_uas)]
         self._appraisals = [Appraisal(alone, blocks) for alone in self._alone]
         self._together = Appraisal(problem, blocks)
-        self._late = False  # whether a program had no solution when its time was up
         self._own: dict[int, RestrictedMilp] = {}
-        self._formulating_s = 0.0
         self._plans: list[list[Plan]] = [[] for _ in range(problem.n_uas)]
         self._best: Plan | None = None
         self._bound = -np.inf
+        self.work = 0.0  # of the programs so far
+        self.programs = 0
+        self._joint = 0.0  # work of the joint program, about; 0 where it is not solved
+        self.cut_short = False  # whether the time limit has left out or ended a program
 
-    def prepare(self, planned: Sequence[int]) -> float:
-        """Write the own programs of the UAS that are planned for; how long it took [s]."""
-        before = time.perf_counter()
+    def prepare(self, planned: Sequence[int]) -> None:
+        """Write the own programs of the UAS that are planned for."""
         self._own = {uas: RestrictedMilp(self._alone[uas], self._blocks) for uas in planned}
-        self._formulating_s = time.perf_counter() - before
-        return self._formulating_s
+        whole = self.effort.joint is not None and len(planned) == self.problem.n_uas
+        if whole and not (self.problem.tours and self.problem.n_uas > 1):
+            # its root takes an iteration a row, and it has about the rows of all own programs
+            rows = sum(len(program.built.row_lower) for program in self._own.values())
+            self._joint = _PER_ITERATION_AND_ROW * rows**2
 
     def safe(self, uas: int, plans: Sequence[Plan]) -> list[Plan]:
         """Those of a UAS's plans that are clear of everything but the other UAS.
@@ -119,12 +126,13 @@ class TeamSearch:
         return within or clear
 
     def planned(self, round_robin: RoundRobin, urgent: Collection[int]) -> list[int]:
-        """The UAS that are planned for: all of them where the time suffices."""
-        most = min(self.problem.n_uas, self.effort.at_once)
-        if not self.effort.deterministic:
-            each_s = max(_PER_UAS_S, _PER_WRITING * round_robin.writing_s)
-            most = min(most, int(self.effort.threads * self.time_left_s() / each_s))
-        return round_robin.select(self.problem.names, urgent, max(most, 1))
+        """The UAS that are planned for: all of them where the work suffices.
+
+        A program takes what one took in the last decision.
+        """
+        enough_for = int(self.effort.work / (_PROGRAMS_EACH * round_robin.work_of_one))
+        most = min(self.problem.n_uas, self.effort.at_once, max(enough_for, 1))
+        return round_robin.select(self.problem.names, urgent, most)
 
     def has_plan(self, uas: int) -> bool:
         """Whether a program has given the UAS a plan."""
@@ -134,94 +142,63 @@ class TeamSearch:
     def outcome(self) -> Plan | Reason:
         """The best verified plan, with the bound proven; or why no UAS has a new one."""
         if self._best is not None and self._best.renewed:
-            return replace(self._best, bound=min(self._bound, self._best.objective))
+            bound = min(self._bound, self._best.objective)
+            return replace(self._best, bound=bound, cut_short=self.cut_short)
         if self._best is not None:
             return Reason.WAITING_IS_CHEAPER
         if any(self._plans):
             return Reason.NO_TEAM
-        return Reason.NO_TIME if self._late else Reason.NO_PLAN
+        return Reason.NO_TIME if self.cut_short else Reason.NO_PLAN
 
-    def refined(
+    def refine(
         self,
-        uas: int,
-        flight: PlannedTrajectory,
+        tasks: Sequence[tuple[int, PlannedTrajectory]],
         neighbourhood: Neighbourhood,
-        at_most_s: float = np.inf,
-    ) -> Plan | None:
-        """Solve a UAS's own OCP restricted to what lies near a flight."""
-        if self.joint_is_due(uas):
-            return None
-        if not self._has_time(_WORTH_STARTING_S):
-            self._late = True
-            return None
+        side_by_side: ThreadPoolExecutor,
+    ) -> None:
+        """Solve each UAS's own OCP restricted to what lies near flights, in their order.
+
+        Once the work is done but for the joint program, only for UAS without a plan.
+        """
+        most = _AT_MOST * self.effort.work
+        share = self._joint if self._joint <= _JOINT_SHARE * self.effort.work else 0.0
+        enough = self.effort.work - share
+        for first in range(0, len(tasks), _WAVE):
+            due = [
+                (uas, flight)
+                for uas, flight in tasks[first : first + _WAVE]
+                if self.work < (enough if self._plans[uas] else most)
+            ]
+            solved = side_by_side.map(lambda task: self._refined(*task, neighbourhood), due)
+            for (uas, _), solution in zip(due, solved, strict=True):
+                self._collect(uas, solution)
+
+    def _refined(
+        self, uas: int, flight: PlannedTrajectory, neighbourhood: Neighbourhood
+    ) -> Solution | None:
+        """A UAS's own OCP restricted to what lies near a flight; changes nothing here."""
         program = self._own[uas]
         path, visit = flight.positions_m[None], flight.visit[None]
         bounds = program.bounds_near(path, visit, neighbourhood)
-        start = program.start(path, visit)
-        share_s = self.effort.time_limit_s * (1.0 if neighbourhood is ALONG else _RESTRICTED_SHARE)
         limits = SolverLimits(
-            time_s=min(share_s, self.time_left_s(), at_most_s),
-            nodes=None,
-            relative_gap=0.01,
-            absolute_gap=0.05,
-            heuristics=False,
+            nodes=self._nodes(_NODES), relative_gap=0.01, absolute_gap=0.05, heuristics=False
         )
-        if self.effort.deterministic:
-            limits = replace(limits, time_s=None, nodes=_RESTRICTED_NODES)
-        solution = self._solved(program, limits, start, bounds)
-        if solution is None or solution.values is None:
-            unsolved = solution is not None and solution.status is SolveStatus.NO_SOLUTION
-            self._late |= unsolved and limits.time_s is not None
-            return None
-        return program.plan(solution)
+        return self._solved(program, limits, program.start(path, visit), bounds)
 
-    def joint_is_due(self, uas: int) -> bool:
-        """Whether what is left of the time is the joint program's, and the UAS has a plan."""
-        everyone = len(self._own) == self.problem.n_uas > 1 and not self.problem.tours
-        if not everyone or self.effort.deterministic or self.effort.joint is None:
-            return False
-        if not self.has_plan(uas):
-            return False
-        return self.time_left_s() < _JOINT_SHARE * self.effort.time_limit_s
+    def _collect(self, uas: int, solution: Solution | None) -> None:
+        """Count a solve's work and keep its plan."""
+        if solution is None:
+            return
+        program = self._own[uas]
+        self.work += work_of(program, solution.iterations)
+        self.programs += 1
+        if solution.values is not None:
+            self.collect(uas, [program.plan(solution)])
 
-    def polished(
-        self, uas: int, tasks: Sequence[tuple[int, PlannedTrajectory]], at_most_s: float
-    ) -> list[Plan]:
-        """Plans of one UAS along its tour: around its flights, then around the best again.
-
-        Restricted to the sides at which a flight passes obstacles a program takes a fraction of a
-        second; around its solution other sides come near, until nothing is gained.
-        """
-        until = time.perf_counter() + at_most_s
-        # what is left of a plan that sets off late sets off later each time it is planned anew: of
-        # two flights the one that gets farther is first, since time may be up before the other's
-        own = sorted(
-            [flight for other, flight in tasks if other == uas][:_STARTS],
-            key=lambda flight: flight.cost + flight.too_close_m,
-        )
-        plans: list[Plan] = []
-        for _ in range(_STARTS + _POLISHES):
-            left_s = until - time.perf_counter()
-            enough_s = _WORTHWHILE_S if plans else _WORTH_STARTING_S
-            if not self.effort.deterministic and left_s < enough_s:
-                self._late |= not plans
-                break
-            flight = own.pop(0) if own else as_trajectory(self._alone[uas], 0, plans[0])
-            plan = self.refined(uas, flight, ALONG, left_s)
-            gained = plan is not None and (
-                not plans or plan.objective < plans[0].objective - _WORTH_POLISHING
-            )
-            if plan is not None:
-                plans = sorted([plan, *plans], key=lambda one: one.objective)
-            if not own and not gained:
-                break
-        return plans
-
-    def collect(self, uas: int, plans: Sequence[Plan | None]) -> None:
-        """Keep the plans found for a UAS."""
-        for plan in plans:
-            if plan is not None and self._appraisals[uas].trouble(plan) is None:
-                self._plans[uas].append(plan)
+    def collect(self, uas: int, plans: Sequence[Plan]) -> None:
+        """Keep those of the plans found for a UAS that may be flown."""
+        clear = (plan for plan in plans if self._appraisals[uas].trouble(plan) is None)
+        self._plans[uas].extend(clear)
 
     def combine(self, spare: Sequence[Sequence[Plan]]) -> None:
         """The best team of the plans found that holds as a whole.
@@ -283,35 +260,26 @@ class TeamSearch:
         return replace(joined, objective=joined.objective + coupling, renewed=renewed)
 
     def improve(self) -> None:
-        """The whole OCP from the best plan so far, with the time that is left.
+        """The whole OCP from the best plan so far, with the work that is left.
 
         In the tightest form, since its bound is what is asked for, and the only one that a plan
-        gets. A deterministic decision solves the root, of a program that is not too large; with
-        tours, that of one UAS only.
+        gets; of several UAS the root.
         """
-        deterministic, alone = self.effort.deterministic, self.problem.n_uas == 1
-        if self.effort.joint is None or len(self._own) < self.problem.n_uas:
+        if not self._joint or self.work + self._joint > _AT_LEAST * self.effort.work:
             return
-        if deterministic and self.problem.tours and not alone:
-            return
-        # the whole program takes about as long to write as all own programs together
-        if not self._has_time(_WORTHWHILE_S + (0.0 if alone else 1.5 * self._formulating_s)):
-            return
+        alone = self.problem.n_uas == 1
         if alone and self.problem.tours:
             program = self._own[0]
         else:
             program = RestrictedMilp(self.problem, self._blocks, first=self.effort.joint)
-        if deterministic and program.built.integer.sum() > _JOINT_WHOLE:
-            return
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))
-        limits = SolverLimits(time_s=max(self.time_left_s(), 0.01))
-        if deterministic:
-            nodes = _ALONE_NODES if alone else _JOINT_NODES
-            limits = SolverLimits(nodes=nodes, relative_gap=0.01, heuristics=False)
+        nodes = self._nodes(_ALONE_NODES if alone else _JOINT_NODES)
+        limits = SolverLimits(nodes=nodes, relative_gap=0.01, heuristics=False)
         solution = self._solved(program, limits, start)
         if solution is not None:
+            self.work += work_of(program, solution.iterations)
             self._bound = solution.bound
             if solution.values is not None:
                 self._offer(replace(program.plan(solution), renewed=self.problem.names))
@@ -323,12 +291,20 @@ class TeamSearch:
         start: Start | None,
         bounds: tuple[FloatArray, FloatArray] | None = None,
     ) -> Solution | None:
-        """What the solver says; None where it fails, which ends no flight."""
+        """What the solver says; None where it fails, which ends no flight, or the time is up."""
         lower, upper = (None, None) if bounds is None else bounds
+        left_s = self._time_left_s()
+        if left_s is not None:
+            if left_s < _WORTH_STARTING_S:
+                self.cut_short = True
+                return None
+            limits = replace(limits, time_s=left_s)
         try:
-            return self._solve(program.built, limits, start=start, lower=lower, upper=upper)
+            solution = self._solve(program.built, limits, start=start, lower=lower, upper=upper)
         except SolverError:
             return None
+        self.cut_short |= self._time_left_s() is not None and self._time_left_s() <= 0.0
+        return solution
 
     def _offer(self, plan: Plan) -> None:
         """Keep a plan that is better than the best and whose geometry holds."""
@@ -337,14 +313,16 @@ class TeamSearch:
         if self._together.trouble(plan) is None:
             self._best = plan
 
-    def _has_time(self, seconds: float) -> bool:
-        """Whether so much is left, where the clock counts."""
-        return self.effort.deterministic or self.time_left_s() >= seconds
+    def _nodes(self, usually: int) -> int:
+        """Nodes of a program, in proportion to the effort."""
+        return max(round(usually * self.effort.work), 1)
 
-    def time_left_s(self) -> float:
-        """Until the decision's time is up, less what is kept for afterwards."""
-        limit = (1.0 - _RESERVE) * self.effort.time_limit_s
-        return limit - (time.perf_counter() - self._began)
+    def _time_left_s(self) -> float | None:
+        """Until the decision's time is up, less what is kept for afterwards; None: no limit."""
+        if self.effort.time_limit_s is None:
+            return None
+        limit_s = (1.0 - _LATE) * self.effort.time_limit_s
+        return limit_s - (time.perf_counter() - self._began)
 
 
 def _joined(problem: PlanningProblem, plans: Sequence[Plan]) -> Plan:

@@ -143,4 +143,4 @@ def _claim(model: gurobipy.Model, columns: gurobipy.MVar) -> Claim:
         bound = model.ObjBound
     elif optimal:
         bound = model.ObjVal
-    return Claim(values, bound, optimal, infeasible)
+    return Claim(values, bound, optimal, infeasible, int(model.IterCount))

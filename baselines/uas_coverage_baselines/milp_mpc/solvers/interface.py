@@ -74,6 +74,10 @@ class Solution:
         bound: proven lower bound of the objective; -inf where none.
         violation: largest violation of what the solver returned, rounded; inf where nothing.
         wall_time_s: duration.
+        iterations: simplex iterations, those in sub-programs left out.
+        duals: (R,) what a unit of each row's right-hand side would add to the objective, of a
+            program without free whole numbers that is solved to its optimum; else None, as from
+            solvers other than HiGHS.
     """
 
     status: SolveStatus
@@ -82,6 +86,8 @@ class Solution:
     bound: float
     violation: float
     wall_time_s: float
+    iterations: int = 0
+    duals: FloatArray | None = None
 
 
 class Solve(Protocol):
@@ -126,12 +132,16 @@ class Claim:
         bound: lower bound of the objective; -inf where none.
         optimal: whether the solver calls `values` optimal within the gap.
         infeasible: whether it calls the program infeasible.
+        iterations: simplex iterations that it counts.
+        duals: (R,) of the rows; None without.
     """
 
     values: FloatArray | None
     bound: float
     optimal: bool
     infeasible: bool
+    iterations: int = 0
+    duals: FloatArray | None = None
 
 
 def confirmed(
@@ -153,8 +163,14 @@ def confirmed(
         violation = milp.violation(values)
     if values is None or violation > TOLERANCE:
         outcome = SolveStatus.INFEASIBLE if claim.infeasible else SolveStatus.NO_SOLUTION
-        return Solution(outcome, None, np.inf, claim.bound, violation, wall_time_s)
+        return Solution(
+            outcome, None, np.inf, claim.bound, violation, wall_time_s, claim.iterations
+        )
     outcome = SolveStatus.OPTIMAL if claim.optimal else SolveStatus.FEASIBLE
     objective = float(milp.objective(values))
     bound = min(float(claim.bound), objective)
-    return Solution(outcome, values, objective, bound, violation, wall_time_s)
+    return Solution(
+        *(outcome, values, objective, bound, violation, wall_time_s),
+        iterations=claim.iterations,
+        duals=claim.duals,
+    )

@@ -78,7 +78,8 @@ def _claim(
     status, bound = model.getStatus(), model.getDualbound()
     if abs(bound) >= model.infinity():
         bound = float(np.copysign(np.inf, bound))
-    return Claim(values, bound, status in ("optimal", "gaplimit"), status == "infeasible")
+    optimal, infeasible = status in ("optimal", "gaplimit"), status == "infeasible"
+    return Claim(values, bound, optimal, infeasible, model.getNLPIterations())
 
 
 def _parameters(limits: SolverLimits, elapsed_s: float) -> dict[str, bool | int | float]:

@@ -1,0 +1,201 @@
+"""R13: the safety files with one operator, constant or condition changed: does a test see it?
+
+The mutants are Cosmic Ray's (extra `mutants`), drawn for each file of `benchmarks/mutants.toml`;
+each meets the tests named there, in a copy of the source tree. Only operators that leave a program
+of the kind that someone could have written are used: no `is` between numbers, no `+` for a `<<`.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
+
+ROOT = Path(__file__).parents[2]
+TABLE = tomllib.loads((ROOT / "benchmarks/mutants.toml").read_text("utf-8"))
+LEAST_SHARE = 0.8
+_TREE = ("uas_coverage_env", "baselines", "agents", "benchmarks", "tests", "pyproject.toml")
+_LONGEST_S = {"quick": 180.0, "compiled": 1200.0}
+_SWAPPED = ("Add_Sub", "Mul_Div")
+_COMPARED = ("Lt_LtE", "Gt_GtE", "Lt_GtE", "Gt_LtE", "Eq_NotEq", "Is_IsNot")
+_OTHERS = (
+    "AddNot",
+    "NumberReplacer",
+    "ReplaceAndWithOr",
+    "ReplaceOrWithAnd",
+    "ReplaceTrueWithFalse",
+    "ReplaceFalseWithTrue",
+    "ReplaceBreakWithContinue",
+    "ReplaceContinueWithBreak",
+    "ReplaceUnaryOperator_Delete_USub",
+    "ReplaceUnaryOperator_Delete_Not",
+)
+
+
+def _operators() -> Iterator[str]:
+    """Names of Cosmic Ray's, both ways for each pair."""
+    for kind, pairs in (("Binary", _SWAPPED), ("Comparison", _COMPARED)):
+        for pair in pairs:
+            one, other = pair.split("_")
+            yield f"core/Replace{kind}Operator_{one}_{other}"
+            yield f"core/Replace{kind}Operator_{other}_{one}"
+    yield from (f"core/{name}" for name in _OTHERS)
+
+
+@cache
+def _tree() -> tempfile.TemporaryDirectory[str]:
+    """A copy of the sources of this process's own, with the kernels that are compiled."""
+    place = tempfile.TemporaryDirectory(prefix="mutants_")
+    for name in _TREE:
+        start, end = ROOT / name, Path(place.name, name)
+        if start.is_dir():
+            shutil.copytree(start, end, copy_function=_copied)
+        else:
+            shutil.copy2(start, end)
+    return place
+
+
+def _copied(start: str, end: str) -> None:
+    """Kernels are many and are not written to: linked where the file system can."""
+    if start.endswith(".nbc"):
+        try:
+            os.link(start, end)
+            return
+        except OSError:
+            pass
+    shutil.copy2(start, end)
+
+
+def _drawn(path: str, number: int) -> Any:
+    """The mutant with a number of a file, None beyond the last."""
+    from cosmic_ray.commands.init import _all_work_items
+
+    lines = (ROOT / path).read_text("utf-8").split("\n")
+    wanted = set(_operators())
+    mutants = [item.mutations[0] for item in _all_work_items([ROOT / path], {})]
+    # of an array with one record, [0] and [-1] are the same
+    mutants = [
+        one for one in mutants
+        if one.operator_name in wanted
+        and not ("Number" in one.operator_name and _is_first(lines, one.start_pos))
+    ]  # fmt: skip
+    random.Random(f"{TABLE['seed']} {path}").shuffle(mutants)
+    return mutants[number] if number < len(mutants) else None
+
+
+def _is_first(lines: list[str], start: tuple[int, int]) -> bool:
+    """Whether what begins in a line (from 1 on) at a column is the index [0]."""
+    line, column = start
+    return lines[line - 1][column - 1 : column + 2] == "[0]"
+
+
+def tried(path: str, number: int) -> Result:
+    """Whether the tests of a file see one of its mutants.
+
+    Args:
+        path: Of the file, from the root of the repository.
+        number: Of the mutant; -1: the file as it is, which has to pass.
+    """
+    from cosmic_ray.mutating import use_mutation
+    from cosmic_ray.plugins import get_operator
+
+    (tests,) = (each for each in TABLE["files"] if each["path"] == path)
+    if number < 0:
+        failed = _failing(tests)
+        if failed is not None:
+            raise RuntimeError(f"{path}: {failed} tests fail without a mutant")
+        return {"path": path, "mutant": None}
+    mutant = _drawn(path, number)
+    if mutant is None:
+        return {"path": path, "mutant": None}
+    file = Path(_tree().name, path)
+    with use_mutation(file, get_operator(mutant.operator_name)(), mutant.occurrence) as texts:
+        caught = _failing(tests)
+    before, after = (text.split("\n") for text in texts)
+    (k,) = (k for k, lines in enumerate(zip(before, after, strict=True)) if len({*lines}) > 1)
+    change = f"{path}:{mutant.definition_name}: `{before[k].strip()}` -> `{after[k].strip()}`"
+    return {"path": path, "mutant": change, "line": k + 1, "caught": caught}
+
+
+def _failing(tests: Mapping[str, Any]) -> str | None:
+    """The first of the two kinds of tests that fails in the copy; None where all pass."""
+    root = Path(_tree().name)
+    path = os.pathsep.join(str(root / name) for name in ("", "baselines", "agents"))
+    for kind, longest_s in _LONGEST_S.items():
+        if not tests[kind]:
+            continue
+        environment = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+        environment["NUMBA_DISABLE_JIT"] = str(int(kind == "quick"))
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
+        try:
+            code = subprocess.run(
+                [*command, *tests[kind]], cwd=root, env=environment, timeout=longest_s, check=False,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            ).returncode  # fmt: skip
+        except subprocess.TimeoutExpired:
+            return kind
+        if code not in (0, 1, 2):  # 2: the mutant cannot be imported
+            raise RuntimeError(f"pytest ended with {code}: {' '.join(tests[kind])}")
+        if code:
+            return kind
+    return None
+
+
+def trials(quick: bool) -> list[Trial]:
+    """Each file as it is, and mutants of it."""
+    n = 2 if quick else TABLE["mutants_of_a_file"]
+    return [
+        Trial(f"{each['path']} {number}", tried, (each["path"], number))
+        for each in TABLE["files"]
+        for number in range(-1, n)
+    ]
+
+
+def finding(results: Mapping[str, Result]) -> Finding:
+    """A mutant that no test sees has failed, unless it was read and does the same."""
+    good = [one for one in results.values() if one.get("mutant")]
+    equivalent = {each["mutant"] for each in TABLE.get("equivalent", ())}
+    rows = []
+    for path in dict.fromkeys(one["path"] for one in good):
+        mine = [one for one in good if one["path"] == path]
+        left = [one["mutant"] for one in mine if not one["caught"]]
+        same = sum(one in equivalent for one in left)
+        caught = len(mine) - len(left)
+        rows.append(
+            [f"`{path}`", len(mine), caught, same, len(left) - same, f"{caught / len(mine):.0%}"]
+        )
+    totals = [sum(row[k] for row in rows) for k in range(1, 5)]
+    if rows:
+        rows.append(["all", *totals, f"{totals[1] / totals[0]:.0%}"])
+    headings = ("file", "mutants", "caught", "the same", "not caught", "caught, share")
+    failed = totals[3] + len(errors(results))
+    return Finding(totals[0] + len(errors(results)), failed, markdown(headings, rows))
+
+
+ROW = Row(
+    "R13",
+    "Mutants of the files that keep UAS safe",
+    "mutants",
+    "a test named for the file in `benchmarks/mutants.toml` fails, or the mutant does the same and "
+    f"was read; {LEAST_SHARE:.0%} are to be caught",
+    trials,
+    finding,
+    lambda quick: (
+        f"{2 if quick else TABLE['mutants_of_a_file']} mutants of a file, drawn with seed "
+        f"{TABLE['seed']} from those of Cosmic Ray's operators that swap + and -, * and /, "
+        "comparisons, `and` and `or`, truth values, `break` and `continue`, drop a sign or a "
+        "`not`, and add 1 to a number or take it away"
+    ),
+    "Other files, and tests that are not named for a file but might see its mutants. On demand: "
+    "needs the extra `mutants`, and takes hours, since a mutant of a kernel compiles its callers.",
+)

@@ -1,0 +1,162 @@
+"""Out of the way of what comes, without a solver: the shortest clear flight, or the least harm."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from toy_problems import box, moving, state, toy
+from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
+from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
+
+from uas_coverage_env.vehicle.layout import VX, VZ
+
+HERE = (100.0, 100.0, -20.0)
+STEPS = 24  # 10 s of a direction, and braking
+CLEARANCE_M = 2.0
+
+
+def coming(*paths, at=((HERE),), radius_m=4.0, half_height_m=30.0, **fields):
+    """UAS that hover while something comes: paths are (place now, velocity)."""
+    bodies = [
+        moving(np.add(place, np.outer(np.arange(3), velocity)), radius_m, half_height_m, f"m{k}")
+        for k, (place, velocity) in enumerate(paths)
+    ]
+    return toy(
+        *(state(place) for place in at),
+        moving_obstacles=bodies,
+        moving_clearance_m=CLEARANCE_M,
+        **fields,
+    )
+
+
+def prolonged_to(problem, plan):
+    """The decision with what moves predicted as far as the plan reaches."""
+    n = np.arange(plan.u.shape[1] + 1)[:, None]
+    longer = [
+        dataclasses.replace(m, position_m=m.position_m[0] + n * (m.position_m[1] - m.position_m[0]))
+        for m in problem.moving
+    ]
+    return dataclasses.replace(problem, moving=tuple(longer))
+
+
+def is_clear(problem, plan):
+    return first_trouble(prolonged_to(problem, plan), plan) is None
+
+
+FROM_THE_WEST = (100.0, 40.0, -20.0), (0.0, 6.0, 0.0)
+
+
+def test_a_uas_gets_out_of_the_way_and_brakes():
+    problem = coming(FROM_THE_WEST)
+    plan = evasion(problem, 1.0)
+    assert plan.u.shape == (1, STEPS, 5)
+    assert is_clear(problem, plan)
+    assert np.linalg.norm(plan.x[0, -1, VX : VZ + 1]) < 0.1
+    assert np.linalg.norm(plan.x[0, -1, :3] - HERE) < 16.0, "no farther than it has to"
+    assert not plan.covers.any()
+
+
+def test_where_braking_is_clear_there_is_nothing_to_evade():
+    beside = (100.0 + 4.0 + CLEARANCE_M, 40.0, -20.0), (0.0, 6.0, 0.0)
+    just = [np.add(beside[0], (off_m, 0.0, 0.0)) for off_m in (0.01, -0.01)]
+    assert evasion(coming((just[0], beside[1])), 1.0) is None
+    assert evasion(coming((just[1], beside[1])), 1.0) is not None
+
+
+def test_what_passes_above_or_below_is_no_harm():
+    for up, clear in ((1, True), (-1, True)):
+        height_m = 3.0 + CLEARANCE_M + 0.1
+        passing = np.add(FROM_THE_WEST[0], (0.0, 0.0, up * height_m)), FROM_THE_WEST[1]
+        assert (evasion(coming(passing, half_height_m=3.0), 1.0) is None) == clear
+        touching = np.add(passing[0], (0.0, 0.0, -up * 0.2)), passing[1]
+        assert evasion(coming(touching, half_height_m=3.0), 1.0) is not None
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_uas_beside_a_wall_goes_the_other_way(side):
+    wall = box(
+        (100.0 + side * 3.0 if side > 0 else 90.0, 60.0, -49.0),
+        (110.0 if side > 0 else 97.0, 140.0, 0.0),
+    )
+    problem = coming(FROM_THE_WEST, obstacles=[wall], clearance_m=1.5)
+    plan = evasion(problem, 1.0)
+    assert is_clear(problem, plan)
+    assert side * (plan.x[0, -1, 0] - 100.0) < -3.0
+
+
+def test_a_uas_at_the_fence_stays_within_its_margin():
+    north, at = box((0.0, 0.0, -50.0), (103.0, 200.0, 0.0)), HERE
+    problem = coming(FROM_THE_WEST, at=(at,), fence=north, fence_margin_m=2.0)
+    plan = evasion(problem, 1.0)
+    assert is_clear(problem, plan)
+    assert plan.x[0, -1, 0] < 97.0
+
+
+def test_a_uas_does_not_go_down_below_the_least_height():
+    low = (100.0, 100.0, -8.0)
+    flat = np.add(low, (0.0, -60.0, -3.0)), (0.0, 6.0, 0.0)  # comes above its middle
+    known = {"at": (low,), "half_height_m": 4.0, "radius_m": 40.0}
+    free = coming(flat, **known)
+    down = evasion(free, 1.0)
+    assert is_clear(free, down)
+    assert down.x[0, -1, 2] > -8.0, "down is the shorter way"
+    bound = coming(flat, **known, min_height_m=8.0, home_m=[(10.0, 10.0, -1.0)])
+    up = evasion(bound, 1.0)
+    assert up.x[0, 1:, 2].max() <= -8.0 + 1e-3
+
+
+def test_between_samples_nothing_passes_unseen():
+    # 30 m in a step: before and behind the UAS at the samples
+    fast = (100.0, 85.0 - 60.0, -20.0), (0.0, 30.0, 0.0)
+    problem = coming(fast, radius_m=1.0)
+    plan = evasion(problem, 1.0)
+    assert plan is not None
+    across = np.abs(plan.x[0, 2:4, 0] - 100.0)
+    assert across.min() > 2.0
+
+
+def test_where_no_flight_is_clear_the_one_that_comes_least_too_near_is_flown():
+    wide = (100.0, 60.0, -20.0), (0.0, 9.0, 0.0)
+    problem = coming(wide, radius_m=30.0)
+    plan = evasion(problem, 1.0)
+    assert not is_clear(problem, plan)
+
+    def depth_m(path_m):
+        k = np.arange(len(path_m))[:, None]
+        level_m = np.hypot(*(path_m - (np.add(wide[0], k * wide[1])))[:, :2].T) - 30.0
+        return np.maximum(CLEARANCE_M - level_m, 0.0)
+
+    stays = np.tile(HERE, (STEPS + 1, 1))
+    assert (depth_m(plan.x[0, :, :3]) ** 2).sum() < 0.6 * (depth_m(stays) ** 2).sum()
+
+
+def test_of_two_uas_the_second_keeps_clear_of_the_way_of_the_first():
+    apart_m = 7.0
+    at = (HERE, (100.0 + apart_m, 100.0, -20.0))
+    first = (np.add(HERE, (0.0, -60.0, 0.0)), (0.0, 6.0, 0.0))
+    problem = coming(first, at=at, separation_m=6.0, radius_m=2.0)
+    plan = evasion(problem, 1.0)
+    assert is_clear(problem, plan)
+    moved_m = np.linalg.norm(plan.x[:, -1, :3] - plan.x[:, 0, :3], axis=1)
+    assert moved_m[0] > 2.0
+    alone = evasion(coming(first, radius_m=2.0), 1.0)
+    assert alone is not None
+
+
+def test_two_uas_in_the_way_of_one_thing_part_without_meeting():
+    at = (HERE, (100.0, 108.0, -20.0))
+    problem = coming(FROM_THE_WEST, at=at, separation_m=6.0)
+    plan = evasion(problem, 1.0)
+    assert is_clear(problem, plan)
+    assert (np.linalg.norm(plan.x[:, -1, :2] - plan.x[:, 0, :2], axis=1) > 1.0).all()
+
+
+def test_two_uas_that_are_too_near_part_though_nothing_moves():
+    at = (HERE, (100.0, 104.0, -20.0))
+    problem = coming(at=at, separation_m=6.0)
+    plan = evasion(problem, 1.0)
+    level_m = np.hypot(*(plan.x[0, :, :2] - plan.x[1, :, :2]).T)
+    up_m = np.abs(plan.x[0, :, 2] - plan.x[1, :, 2])
+    assert np.maximum(level_m, up_m)[-1] >= 6.0
+    above = (HERE, (100.0, 100.0, -26.5))
+    assert evasion(coming(at=above, separation_m=6.0), 1.0) is None
