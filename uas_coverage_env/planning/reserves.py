@@ -65,7 +65,7 @@ LEARNED_ROUTE = TRAJECTORY._replace(spare_s=8.0)
 """Of `learned-route`: that of the routes its networks learnt from; they read these numbers."""
 
 ORDER_GUIDE = Reserve(kept_s=25.0, landing_s=4.0)
-"""Of the order that `milp-mpc-guided` follows, somewhat more than `MILP_RESERVE` and
+"""Of the order of `milp-mpc` (`order=search`, and in wind), somewhat more than `MILP_RESERVE` and
 `MILP_BRAKING_S` hold back for braking and landing. Chosen by hand."""
 
 BRAKING_S = 14.0
