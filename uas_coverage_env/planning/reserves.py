@@ -19,13 +19,6 @@ LAWNMOWER = TravelTimeModel(speed_share=0.8)
 """Of `lawnmower`: the legs of its runs, straight, at a share of the cruise speed. Chosen by hand:
 it only compares runs."""
 
-LEARNED_LEG = TravelTimeModel(speed_share=0.8, vertical_s=1.6)
-"""Of `learned-waypoint`, to a waypoint: an input of its trained network. Chosen by hand before its
-training; no command shows what it costs."""
-
-LEARNED_RETURN = TravelTimeModel(speed_share=0.8, vertical_s=-1.6, landing_s=6.0)
-"""Of `learned-waypoint`, home; likewise."""
-
 
 class Reserve(NamedTuple):
     """What a planner's routes allow for, and leave in the battery or before the mission ends."""
@@ -93,7 +86,7 @@ LEARNED_ROUTE = TRAJECTORY._replace(
     spare_s=8.0,
 )
 ORDER_GUIDE = Reserve(
-    "the order along which `milp-mpc` flies with `order`: somewhat more than `MILP_RESERVE` and "
+    "the order of `milp-mpc` (`order=search`, and in wind): somewhat more than `MILP_RESERVE` and "
     "`MILP_BRAKING_S` hold back",
     "`uas-coverage compare --planners milp-mpc`; chosen by hand",
     kept_s=25.0,
@@ -103,12 +96,6 @@ ROUTE_HOME_RESERVE = Reserve(
     "UAS that `milp-mpc` flies home along a route: others may be in the way",
     "`benchmarks/returns.py`; chosen by hand",
     kept_s=30.0,
-)
-LEARNED_CLOCK_RESERVE = Reserve(
-    "`learned-waypoint`, before the mission ends: what return mode keeps of it, an input of its "
-    "network",
-    "none",
-    kept_s=18.0,
 )
 
 RESERVES = {name: value for name, value in globals().items() if isinstance(value, Reserve)}
