@@ -27,8 +27,8 @@ from uas_coverage_env.autopilot.lookahead import fixed_slack
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
-from uas_coverage_env.mission.raised import raised
 from uas_coverage_env.planning.routing.search import arrays_of
+from uas_coverage_env.planning.routing.terrain import raised
 from uas_coverage_env.vehicle.layout import THETA, VX, VY, X
 from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.world import build_arena

@@ -1,8 +1,6 @@
 """The next places of a route: waypoints and home, with or without the corners on the way there.
 
-The world's routes fly over what is low and round what is tall. Where a climb takes longer than the
-way round, round is better even where over is possible; so everything is asked twice, the second
-time in an arena whose obstacles are raised (`mission.raised`).
+Over or round is asked as for leg times (`planning.routing.terrain`).
 """
 
 import math
@@ -22,8 +20,9 @@ from uas_coverage_agents.route.leg_flight import (
 )
 from uas_coverage_env.autopilot.guidance import LEAD_S
 from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.planning.routing.terrain import corner_between, over_s, round_s
 from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world.routes import CLEAR, ROUND_CORNER, leg_from_corner, route
+from uas_coverage_env.world.routes import CLEAR, ROUND_CORNER, route
 
 
 @allocating_kernel
@@ -38,14 +37,6 @@ def write_place(arena, i, targets, n_targets, k, place):
     place[:3] = arena.uas[i].home_m
     place[IS_HOME] = 1.0
     return arena.waypoints.shape[0] + i
-
-
-@allocating_kernel
-def _over_s(x, uas, to, way_m, needed_m):
-    """Time [s] of a way over roofs: flown, or climbed and descended, whichever is longer."""
-    rise_s = max(needed_m + x[S.Z], 0.0) / uas.climb_mps
-    sink_s = max(needed_m + to[DOWN] - to[RADIUS], 0.0) / uas.descent_mps
-    return max(way_m / uas.speed_mps, rise_s + sink_s)
 
 
 @allocating_kernel
@@ -68,29 +59,10 @@ def detour_s(arena, around, i, row, x, to):
     if leg == CLEAR:
         return 0.0
     needed_m, _ = over_roofs(arena, x, end_x, end_y, -to[DOWN], uas, leg)
-    seconds = _over_s(x, uas, to, way_m, needed_m)
+    seconds = over_s(uas, x, to, to[RADIUS], way_m, needed_m)
     if needed_m + x[S.Z] > 0.0:
-        _, _, way_m, leg = route(around, row, x[S.X], x[S.Y], x[S.Z], to[NORTH], to[EAST], to[DOWN])
-        if leg == ROUND_CORNER:
-            seconds = min(seconds, way_m / uas.speed_mps)
+        seconds = min(seconds, round_s(around, uas, row, x, to))
     return seconds - straight_m / uas.speed_mps
-
-
-@allocating_kernel
-def _corner_to(arena, around, row, at, is_corner, to):
-    """(north, east, whether it is one) of the corner on the way from a place to the next."""
-    for known in (arena, around):
-        if is_corner:
-            north_m, east_m, leg = leg_from_corner(
-                known, row, at[NORTH], at[EAST], at[DOWN], to[NORTH], to[EAST], to[DOWN]
-            )
-        else:
-            north_m, east_m, _, leg = route(
-                known, row, at[NORTH], at[EAST], at[DOWN], to[NORTH], to[EAST], to[DOWN]
-            )
-        if leg == CLEAR:
-            return north_m, east_m, False
-    return north_m, east_m, leg == ROUND_CORNER
 
 
 @allocating_kernel
@@ -102,11 +74,12 @@ def places_along(arena, around, i, x, targets, n_targets, ahead):
     row = write_place(arena, i, targets, n_targets, 0, to)
     corner = leg == ROUND_CORNER
     if needed_m > max(-x[S.Z], -to[DOWN]):
-        over_s = _over_s(x, uas, to, math.hypot(to[NORTH] - x[S.X], to[EAST] - x[S.Y]), needed_m)
+        way_m = math.hypot(to[NORTH] - x[S.X], to[EAST] - x[S.Y])
+        climbing_s = over_s(uas, x, to, to[RADIUS], way_m, needed_m)
         north_m, east_m, way_m, round_leg = route(
             around, row, x[S.X], x[S.Y], x[S.Z], to[NORTH], to[EAST], to[DOWN]
         )
-        if round_leg == ROUND_CORNER and way_m / uas.speed_mps < over_s + LEAD_S:
+        if round_leg == ROUND_CORNER and way_m / uas.speed_mps < climbing_s + LEAD_S:
             corner, leg = True, ROUND_CORNER
             ahead[0] = 0.0
             ahead[0, NORTH], ahead[0, EAST], ahead[0, RADIUS] = north_m, east_m, CORNER_M
@@ -116,7 +89,7 @@ def places_along(arena, around, i, x, targets, n_targets, ahead):
     while k < AHEAD:
         row = write_place(arena, i, targets, n_targets, j, to)
         if k > 0:
-            north_m, east_m, there = _corner_to(
+            north_m, east_m, there = corner_between(
                 arena, around, row, ahead[k - 1], corner and k == 1, to
             )
             if there:

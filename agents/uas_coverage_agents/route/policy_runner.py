@@ -21,7 +21,7 @@ from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal, in_large_
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.mission.learnt_wind import LearntWind, in_disturbances
-from uas_coverage_env.mission.raised import raised
+from uas_coverage_env.planning.routing.terrain import raised
 from uas_coverage_env.world import Command, SwarmState, Velocity, build_arena
 
 
