@@ -431,6 +431,20 @@ def test_searching_the_beginnings_is_searching_the_whole_with_the_rests_as_they_
             assert new[len(new) - len(old) + most :].tolist() == old[most:].tolist()
 
 
+def test_a_uas_whose_beginning_is_empty_flies_to_its_rest_at_once():
+    whole = task(5, waypoints=14, turn_s=np.zeros((2, 14)))
+    order = routes_of([np.arange(7), np.arange(7, 14)])
+    part = RouteWindow.of(whole, order, 2)
+    nothing = part.problem.replace(open_waypoints=np.zeros(0, int))
+    seconds = improve_routes(nothing, part.order, SearchEffort(0), 0).seconds
+    for u, rest in enumerate(part.rests):
+        legs_s = sum(whole.between_s[whole.uas["kind"][u], a, b] for a, b in pairwise(rest))
+        there_s = whole.first_s[u, rest[0]] + legs_s + whole.home_s[u, rest[-1]]
+        assert seconds[u] == pytest.approx(there_s)
+    ends_m = [part.problem.uas["start_m"][u].tolist() for u in range(2)]
+    assert ends_m == [whole.waypoints_m[w, :2].tolist() for w in (2, 9)], "turns are towards it"
+
+
 def test_what_no_battery_reaches_stays_left_out_when_beginnings_are_searched():
     neighbours = np.array([[(w + 1) % 14, (w + 2) % 14] for w in range(14)])
     whole = task(5, waypoints=14, budget_s=np.full(2, 60.0), neighbours=neighbours)

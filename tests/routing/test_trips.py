@@ -215,3 +215,39 @@ def test_a_later_trip_waits_for_no_release_and_goes_where_a_charge_of_now_must_n
     assert set(order.routes[0]) == {3, 4, 5}
     assert set(order.trips[0][0]) == {0, 1, 2}
     assert not len(order.left_out)
+
+
+def test_flights_fill_no_more_than_their_share_of_a_budget_but_for_what_is_left_out_otherwise():
+    home = at_home(1, 20, 2, 56.0)
+
+    def longest_s(share):
+        order = found(home, packs(home, 9, budget_share=share))
+        assert not len(order.left_out)
+        flights = [(u, order.routes[u]) for u in range(2)]
+        flights += [(u, trip) for u in range(2) for trip in order.trips[u]]
+        return max(seconds_of(home, u, route) for u, route in flights)
+
+    assert longest_s(1.0) > 0.9 * 56.0
+    assert longest_s(0.8) <= 0.84 * 56.0 + 0.5  # the turns of the search come from a table
+
+
+def test_where_each_far_waypoint_takes_a_pack_of_its_own_so_many_packs_are_planned_with():
+    home = at_home(0, 6, 1, 36.5)
+    angles = np.radians([0.0, 120.0, 240.0, 60.0, 180.0, 300.0])
+    away_m = np.array([150.0] * 3 + [40.0] * 3)
+    level_m = away_m[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    apart_m = np.linalg.norm(level_m[:, None] - level_m, axis=2)
+    star = home.replace(
+        waypoints_m=np.column_stack([level_m, np.full(6, -20.0)]),
+        first_s=away_m[None] / 10.0,
+        home_s=away_m[None] / 10.0 + 4.0,
+        between_s=apart_m[None] / 10.0,
+        speed_mps=10.0,
+        position_m=np.zeros((1, 2)),
+        start_m=np.zeros((1, 2)),
+        turn_s=np.zeros((1, 6)),
+        neighbours=np.argsort(apart_m, axis=1, kind="stable")[:, 1:],
+    )
+    order = found(star, packs(star, 5))
+    assert not len(order.left_out)
+    assert sorted(len(trip) for trip in (order.routes[0], *order.trips[0])) == [1, 1, 1, 3]
