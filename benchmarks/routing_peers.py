@@ -72,17 +72,20 @@ def problem_of(n_uas: int, n_waypoints: int, seed: int) -> RoutingProblem:
 
 def own(problem: RoutingProblem, weight: float, seconds: float, seed: int) -> Found:
     """Searches of this package, each twice as long as the one before."""
-    trace, best, moves = [], None, _FIRST_MOVES
+    trace: list[tuple[float, float]] = []
+    best, moves = None, _FIRST_MOVES
     improve_routes(problem, empty_routes(problem.n_uas), SearchEffort(10, by_pieces=True), 0)
     while moves < _MOST_MOVES:
         began = time.process_time()
+
+        def told(order: Routes, began: float = began) -> None:
+            trace.append((time.process_time() - began, order.cost_s))
+
         effort = SearchEffort(moves, total_weight=weight, by_pieces=True)
-        order = improve_routes(problem, empty_routes(problem.n_uas), effort, seed)
-        took = time.process_time() - began
-        trace.append((took, order.cost_s))
+        order = improve_routes(problem, empty_routes(problem.n_uas), effort, seed, told)
         if best is None or order.cost_s < best.cost_s:
             best = order
-        if took > 0.5 * seconds:
+        if time.process_time() - began > 0.5 * seconds:
             break
         moves *= 2
     assert best is not None

@@ -2,7 +2,9 @@
 
 import ast
 import re
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from uas_coverage_env.env.observation import home
 from uas_coverage_env.planning import reserves
 from uas_coverage_env.scenario import feasibility
 from uas_coverage_env.vehicle import range as flight_time
+from uas_coverage_env.vehicle.layout import X, Z
 from uas_coverage_env.vehicle.range import (
     SpeedLimits,
     TravelTimeModel,
@@ -19,6 +22,9 @@ from uas_coverage_env.vehicle.range import (
     level_seconds,
     vertical_seconds,
 )
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+import reserves as benchmark
 
 SPEEDS = SpeedLimits(level_mps=10.0, climb_mps=3.0, descent_mps=2.0)
 MODELS = {
@@ -89,3 +95,16 @@ def test_each_reserve_is_used_and_says_what_for_and_by_which_command_it_was_meas
         assert 0.0 < reserve.time_share <= 1.0, name
         for script in re.findall(r"benchmarks/\w+\.py", reserve.measured):
             assert (ROOT / script).exists(), f"{name}: {script} is gone"
+
+
+def test_the_benchmark_counts_a_visit_for_the_uas_that_was_there_first():
+    places = [(0.0, 0.0, -10.0), (50.0, 0.0, -10.0), (99.0, 0.0, -10.0)]
+    waypoints = [SimpleNamespace(position_m=place, radius_m=5.0) for place in places]
+    x = np.zeros((6, 2, 14))
+    x[:, :, Z] = -10.0
+    x[:, 0, X] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0]
+    x[:, 1, X] = [60.0, 55.0, 40.0, 20.0, 4.0, 4.0]
+    flight = SimpleNamespace(scenario=SimpleNamespace(waypoints=waypoints), x=x)
+    (mine, mine_at), (others, others_at) = benchmark.visits_of(flight)
+    assert (mine.tolist(), mine_at.tolist()) == ([0], [0])
+    assert (others.tolist(), others_at.tolist()) == ([1], [1])

@@ -63,8 +63,8 @@ BY_LEGS = Reserve(
 )
 TRAJECTORY = Reserve(
     "routes of `trajectory`, whose flights keep a backup besides",
-    "`benchmarks/reserves.py --planners trajectory --seeds 3000:3005`: legs 0.986 and landing 1.0 s, "
-    "at least 254 s left; the seconds were chosen by hand",
+    "`benchmarks/reserves.py --planners trajectory --seeds 3000:3005`: legs 0.986 and landing "
+    "1.0 s, at least 254 s left; the seconds were chosen by hand",
     kept_s=6.0,
     landing_s=4.0,
     legs_share=0.96,
