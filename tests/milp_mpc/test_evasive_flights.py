@@ -105,14 +105,14 @@ def test_a_uas_does_not_go_down_below_the_least_height():
     assert up.x[0, 1:, 2].max() <= -8.0 + 1e-3
 
 
-def test_between_samples_nothing_passes_unseen():
-    # 30 m in a step: before and behind the UAS at the samples
-    fast = (100.0, 85.0 - 60.0, -20.0), (0.0, 30.0, 0.0)
-    problem = coming(fast, radius_m=1.0)
-    plan = evasion(problem, 1.0)
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_between_samples_nothing_passes_unseen(share):
+    # 30 m in a step: it passes the UAS in the third, before and behind it at the samples
+    fast = (100.0, 100.0 - 30.0 * (2.0 + share), -20.0), (0.0, 30.0, 0.0)
+    plan = evasion(coming(fast, radius_m=1.0), 1.0)
     assert plan is not None
-    across = np.abs(plan.x[0, 2:4, 0] - 100.0)
-    assert across.min() > 2.0
+    away = plan.x[0, 2:4, :3] - HERE
+    assert np.hypot(away[:, 0], away[:, 2]).min() > 2.0
 
 
 def test_where_no_flight_is_clear_the_one_that_comes_least_too_near_is_flown():
