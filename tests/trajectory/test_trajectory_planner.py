@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-import uas_coverage_baselines.trajectory.planner as planner_module
 import uas_coverage_baselines.trajectory.program as program_module
+import uas_coverage_baselines.trajectory.replanning as planner_module
 from small_fleets import FIELD, HOUSE, TOWER, field
 from small_worlds import box, meadow, mover, waypoint
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
