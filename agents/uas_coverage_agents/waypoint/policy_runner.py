@@ -30,7 +30,7 @@ from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.guided_flight import GuidedFlight
-from uas_coverage_env.planning.around.handover import Handover
+from uas_coverage_env.planning.around.handover import away_of
 from uas_coverage_env.world import Command, GoTo, SwarmState, WorldState
 
 
@@ -95,7 +95,7 @@ class WaypointRunner:
             moving_velocity_mps=_NOWHERE,
         )
         self._legs = legs_of(self._still)
-        self._guided, self._handover = GuidedFlight(brief), Handover(brief)
+        self._guided = GuidedFlight(brief)
         n_uas, n_waypoints = len(brief.uas), len(brief.waypoints)
         self._targets = np.full(n_uas, NO_TARGET)
         self._returning = np.zeros(n_uas, dtype=np.bool_)
@@ -131,7 +131,7 @@ class WaypointRunner:
         self._view.update(swarm)
         arena, state = self._view.arena, self._view.state
         state.uncovered[:] = self._guided.wanted(swarm.uncovered)
-        silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
+        silent = away_of(swarm)
         self._targets[silent] = NO_TARGET
         # one that takes no commands is as one on its way home, to the others and in simulations
         state.uas["returning"][:] |= self._returning | silent
