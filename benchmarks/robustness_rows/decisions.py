@@ -24,8 +24,7 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
     "learned-waypoint": ({}, None),
     "learned-velocity": ({}, None),
     "learned-route": ({}, None),
-    "milp-mpc": ({"threads": "1", "time_limit_s": f"{LIMIT_S:g}"}, 12),
-    "milp-mpc-guided": ({"threads": "1", "time_limit_s": f"{LIMIT_S:g}"}, 12),
+    "milp-mpc": ({"threads": "1"}, 12),
 }
 """Planner -> options, and steps that are flown (None: the mission)."""
 
@@ -37,7 +36,6 @@ _MISSIONS = {
     "learned-waypoint": (1, 30),
     "learned-route": (1, 30),
     "milp-mpc": (2, 30),
-    "milp-mpc-guided": (2, 30),
 }
 _OTHERS = (10, 400)
 

@@ -17,7 +17,7 @@ from uas_coverage_env.scenario import with_disturbances
 
 FIRST_SEED = 9000
 _STEPS = 120
-_STEPS_OF = {"milp-mpc-guided": 15}
+_STEPS_OF = {"milp-mpc": 15}
 _LANES = (1, 2, 7)
 
 
@@ -103,7 +103,7 @@ ROW = Row(
     finding,
     lambda quick: (
         f"towns of two UAS from {FIRST_SEED} on, {_STEPS} steps, "
-        f"{_STEPS_OF['milp-mpc-guided']} of the MILP planner"
+        f"{_STEPS_OF['milp-mpc']} of the MILP planner"
     ),
     "Other machines and other versions of the libraries, GPUs, and planners with a clock.",
 )

@@ -7,7 +7,6 @@ from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.velocity.planner import LearnedVelocity
 from uas_coverage_agents.waypoint.planner import LearnedWaypoint
 from uas_coverage_baselines.milp_mpc import MilpMpc
-from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
@@ -18,8 +17,8 @@ from uas_coverage_env.flight.metrics import accomplished
 QUICK = {"at_once": 1, "horizon": 8, "threads": 1, "teams": 2}
 
 
-def milp(planner):
-    return lambda: planner(planner.Options(**QUICK))
+def milp(order):
+    return lambda: MilpMpc(MilpMpc.Options(**QUICK, order=order))
 
 
 PLANNERS = {
@@ -29,8 +28,8 @@ PLANNERS = {
     "learned-waypoint": lambda: LearnedWaypoint(LearnedWaypoint.Options(simulations=4)),
     "learned-route": lambda: LearnedRoute(LearnedRoute.Options(samples=4)),
     "learned-velocity": LearnedVelocity,
-    "milp-mpc": milp(MilpMpc),
-    "milp-mpc-guided": milp(MilpMpcGuided),
+    "milp-mpc": milp("none"),
+    "milp-mpc along an order": milp("search"),
 }
 
 CORNERS = tuple(WAYPOINTS[i] for i in (0, 2, 6, 8))  # enough where a decision takes long

@@ -62,7 +62,7 @@ def test_whatever_changes_a_flight_changes_its_key():
         "as it is": sweep(),
         "option": sweep(options=["milp-mpc:horizon=12"]),
         "another option": sweep(options=["milp-mpc:horizon=13"]),
-        "planner": sweep(planners="milp-mpc-guided"),
+        "planner": sweep(planners="milp-mpc-paper"),
         "label": sweep(planners="mine=milp-mpc"),
         "scenario": sweep("corridor"),
         "seed": sweep(seeds=range(1, 2)),

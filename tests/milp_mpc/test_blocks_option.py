@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from practice_missions import mission
 from uas_coverage_baselines.milp_mpc import MilpMpc
-from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model import named_blocks
 from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
@@ -69,9 +68,9 @@ def run(*options, planner="milp-mpc", steps=8):
     )
 
 
-@pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-guided"])
-def test_a_block_of_a_file_beside_the_command_is_flown(planner):
-    assert run("blocks=my_own_blocks:Low, my_own_blocks:Dear", planner=planner) == 0
+@pytest.mark.parametrize("order", ["none", "search"])
+def test_a_block_of_a_file_beside_the_command_is_flown(order):
+    assert run("blocks=my_own_blocks:Low, my_own_blocks:Dear", f"order={order}") == 0
     flight = Flight.load("mine")
     assert 5.0 < -flight.x[:, 0, 2].min() <= 9.0 + 1e-4
     assert flight.planner_options["blocks"] == ["my_own_blocks:Low", "my_own_blocks:Dear"]
@@ -103,8 +102,8 @@ def test_a_block_is_found_by_the_name_under_which_a_package_announces_it(folder,
     entry = EntryPoint("low", "my_own_blocks:Low", named_blocks.GROUP)
     monkeypatch.setattr(named_blocks, "entry_points", lambda group: [entry])
     assert named_blocks.block_names() == ("low",)
-    planner = load_planner("milp-mpc-guided", {"blocks": "low"})
-    assert isinstance(planner, MilpMpcGuided)
+    planner = load_planner("milp-mpc", {"blocks": "low"})
+    assert isinstance(planner, MilpMpc)
     assert type(planner.blocks[-1]).__name__ == "Low"
     with pytest.raises(InputError, match=r"unknown block 'hgih'.*low"):
         load_planner("milp-mpc", {"blocks": "hgih"})
@@ -119,8 +118,6 @@ def test_no_block_is_added_where_none_is_named(text):
 
 def test_the_weights_are_options_and_what_is_not_given_stays():
     assert MilpMpc().options.weights == Weights()
-    ours = Weights(lift=0.02, torque=0.01, rate=0.01, yaw=0.05, energy=0.05, climb=0.03)
-    assert MilpMpcGuided().options.weights == ours
     planner = load_planner("milp-mpc", {"weight_energy": "0.5", "weight_return_home": "4"})
     assert isinstance(planner, MilpMpc)
     assert planner.options.weights == Weights(energy=0.5, return_home=4.0)

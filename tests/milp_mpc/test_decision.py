@@ -96,11 +96,11 @@ def test_a_deterministic_decision_has_the_bound_of_the_joint_program(problem, by
     assert by_nodes.objective <= without.objective + 1e-6
 
 
-def test_no_gap_is_told_where_the_joint_program_was_not_solved(problem, monkeypatch):
+def test_no_gap_is_told_where_the_joint_program_was_not_solved(problem):
     waiting = dataclasses.replace(BY_NODES, at_once=1)
     assert planned(decide(problem, None, 1.0, waiting)).relative_gap() is None
-    monkeypatch.setattr(team_search, "_JOINT_WHOLE", 10)
-    assert planned(decide(problem, None, 1.0, BY_NODES)).relative_gap() is None
+    little = dataclasses.replace(BY_NODES, work=0.05)
+    assert planned(decide(problem, None, 1.0, little)).relative_gap() is None
 
 
 def test_the_joint_program_is_written_in_the_tightest_form(problem, monkeypatch):
@@ -126,7 +126,7 @@ def test_a_share_of_the_work_is_the_joint_programs_once_each_uas_has_a_plan(
     search.collect(0, [dataclasses.replace(by_nodes, names=by_nodes.names[:1], **alone)])
     with ThreadPoolExecutor(1) as one:
         for work in (0.6, 0.8, 2.5):
-            search.work = work * BY_NODES.work
+            search._joint, search.work = 0.3, work
             search.refine([(0, None), (1, None)], NARROW, one)
             refined.append("next")
     assert refined == [0, 1, "next", 1, "next", "next"]

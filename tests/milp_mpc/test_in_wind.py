@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from small_worlds import meadow, waypoint
 from uas_coverage_baselines.milp_mpc.fallback.plans import fallback_plans
-from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.in_wind import InWind, axes
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
@@ -105,8 +104,8 @@ def test_a_plan_goes_on_from_where_the_uas_is_and_leads_back_to_itself():
 
 def test_of_a_fleet_that_plans_in_turn_none_brakes_between_its_turns():
     town = generate_scenario(5, n_uas=2, n_waypoints=6, n_obstacles=2, disturbances="light")
-    options = GuidedOptions(horizon=10, in_wind="tube", at_once=1, threads=1)
-    flight = rollout(town, MilpMpcGuided(options), 0, max_steps=8)
+    options = MilpMpcOptions(horizon=10, in_wind="tube", at_once=1, threads=1)
+    flight = rollout(town, MilpMpc(options), 0, max_steps=8)
     first_mps = np.hypot(flight.x[2:, 0, VX], flight.x[2:, 0, VY])
     assert first_mps[-1] > 10.0
     assert (np.diff(first_mps) > 0.0).all()

@@ -134,7 +134,7 @@ def test_what_departs_from_the_paper_is_an_option_that_is_off():
     assert departed.obstacle_clearance_m == pytest.approx(0.36 + 2.5)
     assert departed.moving_clearance_m == pytest.approx(0.36 + 4.0)
     assert departed.waypoint_weight.max() > 1.0
-    assert len(planner.blocks) == len(PAPER_OCP) + 1
+    assert len(planner.blocks) == len(PAPER_OCP) + 2
     assert "collision.crossed" in FORMULATIONS["corner"].write(departed, planner.blocks)[0]
 
 

@@ -1,10 +1,18 @@
 """The planner at work: repeatable, for different vehicles, until every UAS has landed."""
 
+import itertools
+import os
+import subprocess
+import sys
+import time
+
 import numpy as np
 import pytest
 from practice_missions import fly, mission, planner, with_uas
 from uas_coverage_baselines.milp_mpc import moving_horizon as planner_module
+from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.planner import MilpMpc
 
 from uas_coverage_env.entities.state import LANDED
 from uas_coverage_env.flight import load_planner, rollout
@@ -24,19 +32,57 @@ def commands_of(scenario, decisions, **options):
     return commands, world.state.x
 
 
-def test_a_deterministic_planner_repeats_itself_bit_by_bit():
-    scenario = load_scenario("open_field")
-    first, there = commands_of(scenario, 6)
-    again, there_again = commands_of(scenario, 6)
-    assert first == again
-    assert there.tobytes() == there_again.tobytes()
+def village_flown(steps=3):
+    """The first steps of the village with the defaults, to the bit."""
+    flight = rollout(load_scenario("village"), MilpMpc(), max_steps=steps)
+    assert not any(decision.fallback for decision in flight.decisions)
+    return flight.x.tobytes(), flight.u.tobytes()
 
 
-def test_how_many_programs_are_solved_side_by_side_changes_nothing_when_deterministic():
+@pytest.fixture(scope="module")
+def village_as_it_is():
+    return village_flown()
+
+
+def test_by_default_the_village_is_flown_the_same_again_on_a_busy_machine(village_as_it_is):
+    spin = "while True: pass"
+    busy = [subprocess.Popen([sys.executable, "-c", spin]) for _ in range(os.cpu_count() or 1)]
+    try:
+        assert village_flown() == village_as_it_is
+    finally:
+        for one in busy:
+            one.kill()
+            one.wait()
+
+
+def test_by_default_a_clock_that_runs_a_thousand_times_as_fast_changes_no_flight(
+    village_as_it_is, monkeypatch
+):
+    clock = time.perf_counter
+    monkeypatch.setattr(time, "perf_counter", lambda: 1000.0 * clock())
+    assert village_flown() == village_as_it_is
+
+
+def test_how_many_programs_are_solved_side_by_side_changes_nothing():
     scenario = load_scenario("open_field")
     alone, _ = commands_of(scenario, 2, threads=1)
     together, _ = commands_of(scenario, 2, threads=4)
     assert alone == together
+
+
+def test_where_a_time_limit_ends_a_decision_its_record_says_so(monkeypatch):
+    scenario, spent = load_scenario("open_field"), itertools.count()
+    made = planner(scenario, time_limit_s=10.0)
+    # the first programs are solved in time, the later ones are not begun
+    monkeypatch.setattr(time, "perf_counter", lambda: float(next(spent)))
+    made.act(World(scenario).swarm_state())
+    decision = made.last_decision
+    assert not decision.fallback
+    assert decision.reason == Reason.CUT_SHORT
+    monkeypatch.undo()
+    made = planner(scenario)
+    made.act(World(scenario).swarm_state())
+    assert made.last_decision.reason is None
 
 
 def test_one_decision_for_different_vehicles_is_a_verified_plan(monkeypatch):

@@ -5,11 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from practice_missions import mission, obstacle, with_uas
-from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.mode_problems import ModeProblems
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, Target, Weights
-from uas_coverage_baselines.milp_mpc.planner import MilpMpcOptions
+from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
 from uas_coverage_env.entities.state import LANDED
@@ -180,7 +179,7 @@ def test_where_nothing_shades_the_target_the_program_is_the_straight_one():
 
 def test_an_order_that_begins_behind_a_wall_leads_round_it_first():
     scenario = mission(BEHIND, [(40.0, 40.0, -1.0)], obstacles=[WALL])
-    made = MilpMpcGuided(GuidedOptions(horizon=8))
+    made = MilpMpc(MilpMpcOptions(horizon=8, order="search"))
     made.reset(MissionBrief.of(scenario), 0)
     problem = made.problem(World(scenario).swarm_state())
     (tour,) = problem.tours

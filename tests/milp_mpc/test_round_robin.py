@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from practice_missions import mission
 from toy_problems import planned, state, toy
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
-from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 
@@ -65,7 +65,7 @@ def test_a_mixed_fleet_whose_uas_take_turns_covers_everything_and_comes_home():
     data["uas"][1].update(vehicle="hexacopter", radius_m=0.6)
     scenario = type(scenario).model_validate(data)
     assert scenario.vehicles == (load_vehicle("s500_v2"), load_vehicle("hexacopter"))
-    planner = MilpMpcGuided(GuidedOptions(horizon=8, at_once=1))
+    planner = MilpMpc(MilpMpcOptions(horizon=8, at_once=1, order="search"))
     flight = rollout(scenario, planner, seed=0)
     assert accomplished(flight)
     assert not flight.breaches

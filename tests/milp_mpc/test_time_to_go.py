@@ -1,4 +1,4 @@
-"""The terminal cost of `milp-mpc-guided`: in the program, in plain arithmetic, in every form."""
+"""The terminal cost of `order=search`: in the program, in plain arithmetic, in every form."""
 
 from dataclasses import replace
 

@@ -13,7 +13,6 @@ PLANNERS = {
     "trajectory": {"orders": 1, "moves": 20_000, "programs": 40, "idle_work": 0},
     "tour": {"moves": 20_000, "changes": 50},
     "milp-mpc": LITTLE_MILP,
-    "milp-mpc-guided": LITTLE_MILP,
     "learned-route": {"samples": 4, "changes": 1000, "rehearsed": 1},
     "learned-waypoint": {},
     "learned-velocity": {},

@@ -1,7 +1,6 @@
 """Whole missions in which the solver fails at random decisions, judged by the independent check."""
 
 import dataclasses
-import time
 
 import numpy as np
 import pytest
@@ -21,16 +20,9 @@ def nothing(status):
     return lambda *args, **limits: Solution(status, None, np.inf, -np.inf, np.inf, 0.0)
 
 
-def late(*args, **limits):
-    """A solve that takes its time and has found nothing by then."""
-    time.sleep(0.02)
-    return nothing(SolveStatus.NO_SOLUTION)(*args, **limits)
-
-
 FAILURES = {
     "no solution": nothing(SolveStatus.NO_SOLUTION),
     "infeasible": nothing(SolveStatus.INFEASIBLE),
-    "late": late,
 }
 
 
@@ -154,7 +146,8 @@ def test_a_start_inside_the_planner_s_margin_ends_in_a_fallback_and_touches_noth
 
 
 def test_without_time_every_uas_hovers_at_the_start(tmp_path, town):
-    planner = load_planner("milp-mpc", {"time_limit_s": "0.01", "horizon": "8", "threads": "1"})
+    # less time than is kept for afterwards, on any machine
+    planner = load_planner("milp-mpc", {"time_limit_s": "1e-6", "horizon": "8", "threads": "1"})
     flight = rollout(town, planner, max_steps=15)
     judged(flight, tmp_path / "hovering")
     assert all(decision.fallback for decision in flight.decisions)
@@ -170,15 +163,13 @@ def with_little_charge(scenario, seconds):
     return type(scenario).model_validate(data)
 
 
-@pytest.mark.parametrize(
-    ("planner", "dynamics"), [("milp-mpc-guided", "lpv"), ("milp-mpc", "nonlinear")]
-)
+@pytest.mark.parametrize(("order", "dynamics"), [("search", "lpv"), ("none", "nonlinear")])
 def test_where_the_solver_is_dead_for_good_every_uas_comes_home(
-    monkeypatch, tmp_path, town, planner, dynamics
+    monkeypatch, tmp_path, town, order, dynamics
 ):
     short = with_little_charge(town, 110.0)
     dead = {step: FAILURES["no solution"] for step in range(14, 400)}
-    killed = Killed(load_planner(planner, QUICK), dead, monkeypatch)
+    killed = Killed(load_planner("milp-mpc", QUICK | {"order": order}), dead, monkeypatch)
     flight = rollout(short, killed, dynamics=dynamics)
     flight.save(tmp_path / "flight")
     tolerance = {} if dynamics == "lpv" else {"plan_tolerance_m": 1.0}

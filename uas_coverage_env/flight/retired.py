@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 FOLLOWERS: Mapping[str, str] = {
+    "milp-mpc-guided": "milp-mpc with --option order=search, or trajectory",
     "learned-waypoint": 'learned-route, or a policy of your own on `action="waypoint"` '
     "(`uas-coverage train maskable-ppo`)",
 }

@@ -1,6 +1,5 @@
-"""The MILP-MPC of Gasche et al., Sec. III, as it is and in real time; and ours with an order."""
+"""The MILP-MPC of Gasche et al., Sec. III, as it is and in real time."""
 
-from uas_coverage_baselines.milp_mpc.guided import MilpMpcGuided
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, PAPER_OCP, Block, formulate
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
@@ -13,7 +12,6 @@ __all__ = [
     "Block",
     "Milp",
     "MilpMpc",
-    "MilpMpcGuided",
     "MilpMpcPaper",
     "PlanningProblem",
     "Variables",

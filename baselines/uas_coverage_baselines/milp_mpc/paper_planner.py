@@ -17,9 +17,10 @@ from pydantic import Field, field_validator, model_validator
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.mode_problems import ModeProblems
-from uas_coverage_baselines.milp_mpc.model.blocks import BatteryReserve
+from uas_coverage_baselines.milp_mpc.model.blocks import BatteryReserve, MinHeight
 from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named, checked
 from uas_coverage_baselines.milp_mpc.model.ocp import PAPER_OCP, Block
+from uas_coverage_baselines.milp_mpc.model.own_data import with_data
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.options import ModeOptions, TimeLimitS, with_default
@@ -161,9 +162,10 @@ class MilpMpcPaper:
         self, options: PaperOptions | None = None, blocks: Sequence[Block] = PAPER_OCP
     ) -> None:
         self.options = options or PaperOptions()
-        reserve = (BatteryReserve(),) if self.options.battery_reserve else ()
+        # the scenario's rule, of which the paper knows nothing; without one it adds no rows
+        ours = (MinHeight(), BatteryReserve()) if self.options.battery_reserve else (MinHeight(),)
         named = (block_named(name) for name in self.options.blocks)
-        self.blocks = (*(checked(block) for block in blocks), *reserve, *named)
+        self.blocks = (*(checked(block) for block in blocks), *ours, *named)
         self._solve = solver_named(self.options.solver)
         self.last_decision: Decision | None = None
         self.last_program: SolvedProgram | None = None
@@ -177,6 +179,7 @@ class MilpMpcPaper:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission; nothing is random in the planner, so the seed changes nothing."""
         refuse_what_asks(brief)
+        self._brief = brief
         self._by_modes = ModeProblems(brief, self.options)
         self.plan = self.last_decision = self.last_program = None
 
@@ -191,7 +194,8 @@ class MilpMpcPaper:
 
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """Algorithms 2 and 3, then the OCP's data."""
-        return self._by_modes.problem(swarm, self.plan)
+        problem = self._by_modes.problem(swarm, self.plan)
+        return with_data(problem, self.blocks, self._brief, swarm)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """One step of Algorithm 1: solve the OCP and fly its first input."""

@@ -2,7 +2,7 @@
 
 A plan is a sequence of wrenches, computed in still air; in a wind each step ends elsewhere, and the
 limits of the vehicle are exceeded. The inner loop knows what pushes the UAS, and guidance flies by
-it. The order is the one of `milp-mpc-guided`, searched on at every decision.
+it. The order is the one of `order=search`, searched on at every decision.
 """
 
 from __future__ import annotations

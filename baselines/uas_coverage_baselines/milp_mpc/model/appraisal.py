@@ -270,6 +270,7 @@ class BlockRows:
                 coefficient=np.asarray(matrix.data, np.float64),
                 row_lower=low[rows] - _ROUNDING,
                 row_upper=high[rows] + _ROUNDING,
+                row=built.row[rows],
             )
         )
         if not len(own.row_lower) and not own.integer.any():

@@ -40,6 +40,7 @@ class BuiltMilp:
         coefficient: (K,) value of each entry.
         row_lower: (R,) row bounds.
         row_upper: (R,) row bounds.
+        row: (R,) number of each in `Milp.row_names()`, of which some may be left out here.
     """
 
     cost: NDArray[np.float64]
@@ -52,6 +53,7 @@ class BuiltMilp:
     coefficient: NDArray[np.float64]
     row_lower: NDArray[np.float64]
     row_upper: NDArray[np.float64]
+    row: NDArray[np.int64]
 
     def objective(self, values: NDArray[np.float64]) -> float:
         """Objective at `values` (C,)."""
@@ -265,6 +267,7 @@ class Milp:
             coefficient=np.asarray(matrix.data, np.float64),
             row_lower=_joined(self._row_lower),
             row_upper=_joined(self._row_upper),
+            row=np.arange(self._n_rows),
         )
 
     def column_names(self) -> list[str]:

@@ -7,8 +7,8 @@ checked by its blocks (`appraisal`). A block that is added to it is in all of th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,9 @@ from uas_coverage_baselines.milp_mpc.model.blocks.coverage import coverable
 from uas_coverage_baselines.milp_mpc.model.blocks.time_to_go import TimeToGo
 from uas_coverage_baselines.milp_mpc.model.milp import ELIMINATED, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
+from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
+from uas_coverage_env.world import SwarmState
 
 
 @runtime_checkable
@@ -57,6 +59,34 @@ class Priced(Protocol):
         ...
 
 
+@runtime_checkable
+class Informed(Protocol):
+    """A block that brings data of its own to each decision; it is optional (`model.own_data`)."""
+
+    def data(self, brief: MissionBrief, swarm: SwarmState) -> Mapping[str, Any]:
+        """What the block reads in `problem.data_of(self)`: numbers and arrays by name.
+
+        Args:
+            brief: the mission.
+            swarm: what is seen now, the time included.
+        """
+        ...
+
+
+PAPER_OCP: tuple[Block, ...] = (
+    Dynamics(),  # OCP_1
+    Capabilities(),  # OCP_3
+    Slack(),  # OCP_4, part I of the objective
+    InsideGeofence(),  # OCP_5
+    TargetDistance(),  # OCP_7, part II
+    Collision(),  # OCP_3
+    Obstacles(),  # OCP_6
+    MovingObstacles(),  # OCP_6
+    CornerCutting(),  # OCP_6
+    Coverage(),  # OCP_8, part III
+)
+"""The paper's own families (Sec. III-C); what is added to `OCP` does not join them."""
+
 OCP: tuple[Block, ...] = (
     Dynamics(),
     Capabilities(),
@@ -72,10 +102,8 @@ OCP: tuple[Block, ...] = (
     TimeToGo(),
     BatteryReserve(),
 )
-
-
-PAPER_OCP = tuple(block for block in OCP if not isinstance(block, (TimeToGo, BatteryReserve)))
-"""The paper's own families: without the two that are ours."""
+"""The paper's families, and three of ours that add rows where there is something to them: a least
+height, an order, charge for the way home."""
 
 
 class MakesVariables(Protocol):

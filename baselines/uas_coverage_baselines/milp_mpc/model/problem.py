@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,11 @@ from uas_coverage_env.vehicle.layout import VX, VZ
 FloatArray = NDArray[np.float64]
 NEVER = 10_000
 """The step of a visit that does not take place."""
+
+
+def name_of(block: object) -> str:
+    """The name of a block's data: its attribute `name`, or its class."""
+    return str(getattr(block, "name", type(block).__name__))
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,7 @@ class Target:
 
 @dataclass(frozen=True)
 class TourSegment:
-    """What a UAS is to visit next, in this order, before it goes on (`milp-mpc-guided`).
+    """What a UAS is to visit next, in this order, before it goes on (`order=search`).
 
     Attributes:
         waypoints: (K,) positions in `PlanningProblem.waypoints_m`.
@@ -192,6 +198,7 @@ class PlanningProblem:
             too; fixed obstacles always have.
         prune: whether reachable sets drop what cannot matter; False keeps every row and column,
             with big M from the fence alone (the oracle of the tests).
+        data: what blocks of one's own read, by the name of the block, see `data_of`.
         tube_m: (U, K) how far disturbances may lead each UAS off, horizontally, at the samples 0
             to K - 1, and later as far as at the last of these; see `tubes`. None: nowhere.
     """
@@ -230,6 +237,7 @@ class PlanningProblem:
     order: int = 4
     corners_of_all: bool = True
     prune: bool = True
+    data: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tube_m: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -283,6 +291,17 @@ class PlanningProblem:
     def hulls(self) -> Hulls:
         """The fixed obstacles' faces."""
         return Hulls.of([hull for _, hull in self.obstacles])
+
+    def data_of(self, block: object) -> Mapping[str, Any]:
+        """What a block has brought to this decision (`own_data.with_data`).
+
+        Raises:
+            KeyError: it has brought nothing.
+        """
+        name = name_of(block)
+        if name not in self.data:
+            raise KeyError(f"no data of block {name}: take the problem from a planner that has it")
+        return self.data[name]
 
     def limit(self, name: str) -> FloatArray:
         """(U,) one of the vehicles' limits by its field name."""

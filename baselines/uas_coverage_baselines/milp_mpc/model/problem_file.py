@@ -122,6 +122,10 @@ def _decision(problem: PlanningProblem) -> dict[str, Any]:
             for way in problem.ways_home
         ],
         "weights": asdict(problem.weights),
+        "data": {
+            block: {name: np.asarray(value).tolist() for name, value in own.items()}
+            for block, own in problem.data.items()
+        },
         "tube_m": None if problem.tube_m is None else problem.tube_m.tolist(),
     }
 
@@ -175,6 +179,10 @@ def _problem(
             for way in row.get("ways_home", ())
         ),
         weights=Weights(**row.get("weights", {})),
+        data={
+            block: {name: np.array(value) for name, value in own.items()}
+            for block, own in row.get("data", {}).items()
+        },
         tube_m=None if row.get("tube_m") is None else np.array(row["tube_m"], float),
         **fields,
     )

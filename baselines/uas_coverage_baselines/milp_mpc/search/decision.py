@@ -94,7 +94,8 @@ def decide(
             for task in _last_resorts(problem, uas, tasks, left[uas])
         ]
         search.refine(resorts, WIDE, side_by_side)
-    round_robin.work_each = search.work / len(planned)
+    if search.programs:
+        round_robin.work_of_one = search.work / search.programs
     search.combine(spare)
     search.improve()
     return search.outcome

@@ -95,6 +95,11 @@ class RestrictedMilp:
             if f"{separation.name}.crossed" in self.milp
         ]
 
+    def row_names(self) -> list[str]:
+        """Name of each row of `built`: its family and its index in the family."""
+        names = self.milp.row_names()
+        return [names[row] for row in self.built.row.tolist()]
+
     def bounds_near(
         self,
         positions_m: FloatArray,

@@ -14,7 +14,7 @@ class RoundRobin:
     """The order in which UAS are planned for, where the work does not suffice for all."""
 
     def __init__(self) -> None:
-        self.work_each = 0.0  # what planning for one UAS took in the last decision
+        self.work_of_one = 0.05  # what solving one program took in the last decision
         self._last: dict[str, int] = {}
         self._decision = 0
 

@@ -42,7 +42,7 @@ class Effort:
     """How much work a decision may take, counted in what every machine repeats.
 
     Attributes:
-        work: of the decision's programs (`work_of`); 1 takes about a second of a quiet core.
+        work: of the decision's programs (`work_of`); with 1 it takes a second of a quiet core.
         threads: how many restricted programs are solved side by side; changes no result.
         teams: how many constructed teams are refined.
         at_once: how many UAS are planned for, at most; the others go on with what they have.
@@ -66,17 +66,19 @@ _WORTH_STARTING_S = 0.05  # less time than this gives no plan
 _TEAMS_VERIFIED = 6
 _NODES, _ALONE_NODES = 60, 30
 _JOINT_NODES = 1  # the root: its bound and what comes of the start
-_JOINT_WHOLE = 2000  # binaries: the root of a larger program takes many seconds
-_JOINT_SHARE = 0.3  # of the work, for the joint program once each UAS has a plan
-_MOST = 2.0  # of the work, for UAS that have no plan yet
+_JOINT_SHARE = 0.6  # of the work: the most that is kept for the joint program
+_AT_LEAST, _AT_MOST = 1.1, 2.0  # of the work: with which it is solved, with which all ends
 _WAVE = 4  # programs after which the work is counted, whatever the number of threads
-_PER_ENTRY, _PER_ITERATION = 1e-5, 1.2e-7  # seconds of a quiet core: measured, docs/solvers.md
+# 1 is 0.85 s of a quiet core (docs/solvers.md); the rest of a second is for all but programs
+_PER_ENTRY, _PER_ITERATION_AND_ROW = 6e-7, 3.5e-8
+_PROGRAMS_EACH = 2  # at least, of a UAS that is planned for
 
 
 def work_of(program: RestrictedMilp, iterations: int) -> float:
-    """What solving a program takes: presolve by its entries, simplex by iterations and columns."""
+    """What solving a program takes: presolve by its entries, each iteration by its rows."""
     built = program.built
-    return _PER_ENTRY * len(built.column) + _PER_ITERATION * iterations * len(built.cost)
+    simplex = _PER_ITERATION_AND_ROW * iterations * len(built.row_lower)
+    return _PER_ENTRY * len(built.column) + simplex
 
 
 class TeamSearch:
@@ -99,11 +101,18 @@ class TeamSearch:
         self._best: Plan | None = None
         self._bound = -np.inf
         self.work = 0.0  # of the programs so far
+        self.programs = 0
+        self._joint = 0.0  # work of the joint program, about; 0 where it is not solved
         self.cut_short = False  # whether the time limit has left out or ended a program
 
     def prepare(self, planned: Sequence[int]) -> None:
         """Write the own programs of the UAS that are planned for."""
         self._own = {uas: RestrictedMilp(self._alone[uas], self._blocks) for uas in planned}
+        whole = self.effort.joint is not None and len(planned) == self.problem.n_uas
+        if whole and not (self.problem.tours and self.problem.n_uas > 1):
+            # its root takes an iteration a row, and it has about the rows of all own programs
+            rows = sum(len(program.built.row_lower) for program in self._own.values())
+            self._joint = _PER_ITERATION_AND_ROW * rows**2
 
     def safe(self, uas: int, plans: Sequence[Plan]) -> list[Plan]:
         """Those of a UAS's plans that are clear of everything but the other UAS.
@@ -119,12 +128,11 @@ class TeamSearch:
     def planned(self, round_robin: RoundRobin, urgent: Collection[int]) -> list[int]:
         """The UAS that are planned for: all of them where the work suffices.
 
-        What planning for one takes is what it took in the last decision.
+        A program takes what one took in the last decision.
         """
-        most = min(self.problem.n_uas, self.effort.at_once)
-        if round_robin.work_each > 0.0:
-            most = min(most, int(self.effort.work / round_robin.work_each))
-        return round_robin.select(self.problem.names, urgent, max(most, 1))
+        enough_for = int(self.effort.work / (_PROGRAMS_EACH * round_robin.work_of_one))
+        most = min(self.problem.n_uas, self.effort.at_once, max(enough_for, 1))
+        return round_robin.select(self.problem.names, urgent, most)
 
     def has_plan(self, uas: int) -> bool:
         """Whether a program has given the UAS a plan."""
@@ -150,9 +158,11 @@ class TeamSearch:
     ) -> None:
         """Solve each UAS's own OCP restricted to what lies near flights, in their order.
 
-        Once the work is done but for the joint program's share, only for UAS without a plan.
+        Once the work is done but for the joint program, only for UAS without a plan.
         """
-        enough, most = (1.0 - _JOINT_SHARE) * self.effort.work, _MOST * self.effort.work
+        most = _AT_MOST * self.effort.work
+        share = self._joint if self._joint <= _JOINT_SHARE * self.effort.work else 0.0
+        enough = self.effort.work - share
         for first in range(0, len(tasks), _WAVE):
             due = [
                 (uas, flight)
@@ -181,6 +191,7 @@ class TeamSearch:
             return
         program = self._own[uas]
         self.work += work_of(program, solution.iterations)
+        self.programs += 1
         if solution.values is not None:
             self.collect(uas, [program.plan(solution)])
 
@@ -252,19 +263,15 @@ class TeamSearch:
         """The whole OCP from the best plan so far, with the work that is left.
 
         In the tightest form, since its bound is what is asked for, and the only one that a plan
-        gets; of several UAS the root, of a program that is not too large.
+        gets; of several UAS the root.
         """
+        if not self._joint or self.work + self._joint > _AT_LEAST * self.effort.work:
+            return
         alone = self.problem.n_uas == 1
-        if self.effort.joint is None or len(self._own) < self.problem.n_uas:
-            return
-        if not alone and (self.problem.tours or self.work >= self.effort.work):
-            return
         if alone and self.problem.tours:
             program = self._own[0]
         else:
             program = RestrictedMilp(self.problem, self._blocks, first=self.effort.joint)
-        if program.built.integer.sum() > _JOINT_WHOLE:
-            return
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))

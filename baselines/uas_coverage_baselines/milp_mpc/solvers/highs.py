@@ -60,11 +60,13 @@ def solve(
         bound = info.mip_dual_bound
     elif optimal:
         bound = info.objective_function_value
-    values = None
+    values = duals = None
+    if optimal and not free_integers.any():
+        duals = np.array(solver.getSolution().row_dual)
     if info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible:
         values = np.array(solver.getSolution().col_value)
     infeasible = status == highspy.HighsModelStatus.kInfeasible
-    claim = Claim(values, bound, optimal, infeasible, max(info.simplex_iteration_count, 0))
+    claim = Claim(values, bound, optimal, infeasible, max(info.simplex_iteration_count, 0), duals)
     return confirmed(claim, milp, lower, upper, time.perf_counter() - began)
 
 

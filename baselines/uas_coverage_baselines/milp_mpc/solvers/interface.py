@@ -75,6 +75,9 @@ class Solution:
         violation: largest violation of what the solver returned, rounded; inf where nothing.
         wall_time_s: duration.
         iterations: simplex iterations, those in sub-programs left out.
+        duals: (R,) what a unit of each row's right-hand side would add to the objective, of a
+            program without free whole numbers that is solved to its optimum; else None, as from
+            solvers other than HiGHS.
     """
 
     status: SolveStatus
@@ -84,6 +87,7 @@ class Solution:
     violation: float
     wall_time_s: float
     iterations: int = 0
+    duals: FloatArray | None = None
 
 
 class Solve(Protocol):
@@ -129,6 +133,7 @@ class Claim:
         optimal: whether the solver calls `values` optimal within the gap.
         infeasible: whether it calls the program infeasible.
         iterations: simplex iterations that it counts.
+        duals: (R,) of the rows; None without.
     """
 
     values: FloatArray | None
@@ -136,6 +141,7 @@ class Claim:
     optimal: bool
     infeasible: bool
     iterations: int = 0
+    duals: FloatArray | None = None
 
 
 def confirmed(
@@ -163,4 +169,8 @@ def confirmed(
     outcome = SolveStatus.OPTIMAL if claim.optimal else SolveStatus.FEASIBLE
     objective = float(milp.objective(values))
     bound = min(float(claim.bound), objective)
-    return Solution(outcome, values, objective, bound, violation, wall_time_s, claim.iterations)
+    return Solution(
+        *(outcome, values, objective, bound, violation, wall_time_s),
+        iterations=claim.iterations,
+        duals=claim.duals,
+    )

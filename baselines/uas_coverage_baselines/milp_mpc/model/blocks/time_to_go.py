@@ -1,4 +1,4 @@
-"""Time still to go along a UAS's own order: what `milp-mpc-guided` adds to the objective."""
+"""Time still to go along a UAS's own order: what `order=search` adds to the objective."""
 
 from __future__ import annotations
 

@@ -37,4 +37,5 @@ def rows_as_bounds(milp: BuiltMilp) -> BuiltMilp:
         coefficient=milp.coefficient[kept],
         row_lower=milp.row_lower[~single],
         row_upper=milp.row_upper[~single],
+        row=milp.row[~single],
     )

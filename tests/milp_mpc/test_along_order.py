@@ -1,24 +1,21 @@
-"""`milp-mpc-guided` at work: whole small missions, a lost UAS, a place that opens late."""
+"""`milp-mpc` with `order=search`: whole small missions, a lost UAS, a place that opens late."""
 
 import dataclasses
 
 import numpy as np
-import pytest
 from practice_missions import mission
-from uas_coverage_baselines.milp_mpc.guided import GuidedOptions, MilpMpcGuided
+from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
-from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
 
-from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.entities.state import LOST
-from uas_coverage_env.flight import load_planner, rollout
+from uas_coverage_env.flight import rollout
 from uas_coverage_env.flight.metrics import accomplished
-from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.scenario import Execution, generate_scenario
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
 
-REPEATABLE = GuidedOptions(horizon=10)
+SEARCHED = MilpMpcOptions(horizon=10, order="search")
 PLACES = [((60.0, 40.0 + 25.0 * k, -10.0), 8.0) for k in range(5)]
 STARTS = [(20.0, 20.0, -1.0), (20.0, 180.0, -1.0)]
 
@@ -40,7 +37,7 @@ def parked(leaves_at_s):
 
 def guide(scenario):
     brief = MissionBrief.of(scenario)
-    made = RouteGuide(brief, ProblemBuilder(brief, REPEATABLE), TourShape())
+    made = RouteGuide(brief, ProblemBuilder(brief, SEARCHED), TourShape())
     world = World(scenario)
     made.begin(world.swarm_state(), 0)
     return made, world
@@ -48,38 +45,10 @@ def guide(scenario):
 
 def test_a_generated_mission_is_covered_and_every_uas_comes_home():
     scenario = generate_scenario(3, n_uas=2, n_waypoints=8, n_obstacles=3)
-    flight = rollout(scenario, MilpMpcGuided(REPEATABLE), seed=0)
+    flight = rollout(scenario, MilpMpc(SEARCHED), seed=0)
     assert accomplished(flight)
     assert not flight.breaches
     assert not any(decision.fallback for decision in flight.decisions)
-
-
-@pytest.mark.parametrize("execution", [None, Execution(flown_by="autopilot")])
-def test_told_to_it_sets_off_along_the_order_of_trajectory(monkeypatch, execution):
-    scenario = generate_scenario(3, n_uas=2, n_waypoints=8, n_obstacles=3)
-    brief = MissionBrief.of(scenario)
-    planned = Trajectory(TrajectoryOptions(threads=2))
-    planned.reset(brief, 5)
-    routes = [route.tolist() for route in planned.mission_plan.order.routes]
-    taken, take = [], RouteGuide.take
-    monkeypatch.setattr(
-        RouteGuide,
-        "take",
-        lambda guide, swarm, order: taken.append(order) or take(guide, swarm, order),
-    )
-    guided = MilpMpcGuided(REPEATABLE.model_copy(update={"order": "trajectory"}))
-    guided.reset(brief.model_copy(update={"execution": execution}), 5)
-    assert [[route.tolist() for route in order.routes] for order in taken] == [routes]
-    swarm = first_sight(brief)
-    guided.act(swarm)
-    ahead = {name: guided.target(name) for name in swarm.names}
-    assert ahead == {
-        name: route[0] if route else HOME for name, route in zip(swarm.names, routes, strict=True)
-    }
-
-
-def test_the_planner_is_known_by_its_name():
-    assert isinstance(load_planner("milp-mpc-guided"), MilpMpcGuided)
 
 
 def test_what_the_moving_obstacle_is_going_to_do_changes_no_order():
@@ -102,9 +71,9 @@ def test_a_lost_uass_waypoints_go_to_the_others():
 def test_a_blocked_place_is_left_aside_and_covered_once_it_opens():
     scenario = mission(PLACES, STARTS, moving_obstacles=[parked(25.0)])
     seen = World(scenario).swarm_state()
-    (blocked,) = ProblemBuilder(MissionBrief.of(scenario), REPEATABLE).blocked_waypoints(seen)
+    (blocked,) = ProblemBuilder(MissionBrief.of(scenario), SEARCHED).blocked_waypoints(seen)
     assert blocked == len(PLACES) - 1
-    flight = rollout(scenario, MilpMpcGuided(REPEATABLE), seed=0)
+    flight = rollout(scenario, MilpMpc(SEARCHED), seed=0)
     assert accomplished(flight)
     everything = np.flatnonzero(flight.covered == len(PLACES))
     assert everything[0] * scenario.dt_s > 25.0
