@@ -52,7 +52,7 @@ TOUR_SCARCE = Reserve(kept_s=20.0, spare_s=3.0, landing_s=3.0)
 was tried are not recorded."""
 
 BY_LEGS = Reserve(kept_s=30.0, landing_s=12.0)
-"""Of `LegMission`: that of `tour`, and as long a landing as return mode's. Chosen by hand; without
+"""Of `LegOrder`: that of `tour`, and as long a landing as return mode's. Chosen by hand; without
 `spare_s`, as its plans are not made anew for a delay. `benchmarks/flown_by.py` sets promised times
 beside those of the files."""
 
