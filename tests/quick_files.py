@@ -5,16 +5,14 @@ QUICK = {
     "test_release.py": "",
     "test_workflows.py": "",
     "agents/test_observer.py": "",
-    "agents/test_stuck_detection.py": "",
     "agents/test_policy_directory.py": (
         "but test_a_policy_with_spoilt_bytes_is_refused_in_one_line_or_is_the_same"
     ),
     "agents/test_route_policy.py": "only test_the_networks_of_the_file_are_those_that_are_compiled",
-    "agents/test_waypoint_observation.py": "",
     "autopilot/test_guidance.py": "",
     "autopilot/test_return_mode.py": "",
     "autopilot/test_safety_filter.py": "",
-    "baselines/test_by_legs.py": (
+    "planning/test_legs_flown.py": (
         "only test_waypoints_in_a_row_are_one_leg "
         "test_corners_cost_what_the_leg_model_loses_in_them_and_straight_on_costs_nothing"
     ),
@@ -100,6 +98,7 @@ QUICK = {
     ),
     "routing/test_order_search.py": "but test_the_search_finds_the_optimum_of_all_orders",
     "paper/test_battery_figure.py": "",
+    "planning/test_backup_courses.py": "",
     "planning/test_reserves.py": "",
     "reproduction/test_comparison.py": "",
     "reproduction/test_told_events.py": "",

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.by_legs.follower import LegFollower
 from uas_coverage_baselines.targets import Targets, warm_up_once
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.handover import Handover
+from uas_coverage_env.planning.following.following import first_of
 from uas_coverage_env.planning.reserves import LAWNMOWER
 from uas_coverage_env.vehicle.range import dod_per_s, level_seconds, speeds_of
-from uas_coverage_env.world import Command, SwarmState
+from uas_coverage_env.world import Command, GoTo, SwarmState
 
 # Share of the charge that a run may be planned to use.
 _USABLE = 0.9
@@ -23,12 +23,12 @@ class Lawnmower:
     """Flies back and forth over the rows of waypoints, each UAS its own part; home in the end."""
 
     Options = AssistedOptions
-    comes_home_by_legs = True
     goes_to = True
 
     def __init__(self, options: AssistedOptions | None = None) -> None:
         self.options = options or AssistedOptions()
         self.assistants = self.options.assistants
+        self.routes: list[list[int]] | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what the first decision compiles."""
@@ -36,7 +36,7 @@ class Lawnmower:
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Order the waypoints and cut the order into runs of about equal time."""
-        self._targets, self._handover = Targets(brief), Handover(brief)
+        self._targets = Targets(brief)
         self._can_cover = brief.can_cover
         waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
         self._runs: list[list[int]] = [[] for _ in brief.uas]
@@ -49,10 +49,7 @@ class Lawnmower:
             if team:
                 for u, run in zip(team, plan_runs(_brief_of(brief, team), order), strict=True):
                     self._runs[u] += run
-        self._by_legs: LegFollower | None = None
-        if brief.execution is not None:
-            self._by_legs = LegFollower(brief)
-            self._by_legs.begin(self._runs)
+        self.routes = None if brief.execution is None else self._runs
 
     @property
     def given_up(self) -> dict[int, str]:
@@ -61,14 +58,15 @@ class Lawnmower:
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Fly each run in order; a UAS that has finished helps with the nearest waypoints."""
-        if self._by_legs is not None:
-            routes = self._routes(swarm, ~self._by_legs.returns)
-            return self._by_legs.commands(swarm, routes)
+        if self.routes is not None:  # an autopilot flies along them
+            self.routes = self._left(swarm)
+            targets = first_of(self.routes, swarm)
+            return {name: GoTo(targets.get(name)) for name in swarm.active}
         return self._targets.commands(swarm, self._next)
 
-    def _routes(self, swarm: SwarmState, may_work: NDArray[np.bool_]) -> list[list[int]]:
+    def _left(self, swarm: SwarmState) -> list[list[int]]:
         """What is left of the runs; one that is lost leaves its run to the one that has least."""
-        works = self._handover.workers(swarm) & ~swarm.returning & may_work
+        works = (swarm.status == FLYING) & ~swarm.returning
         left = [[w for w in run if swarm.uncovered[w]] for run in self._runs]
         for u in np.flatnonzero(~works & (np.array([len(run) for run in left]) > 0)):
             for w in left[u]:

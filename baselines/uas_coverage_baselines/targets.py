@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.rehearsal import rehearse_once
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Planner
-from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
-from uas_coverage_env.mission.guided_flight import GuidedFlight
-from uas_coverage_env.mission.handover import Handover
+from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.planning.following import Following
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 
@@ -32,8 +32,8 @@ class Targets:
 
     def __init__(self, brief: MissionBrief) -> None:
         self._waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
-        self._view = WorldView(brief)
-        self._guided, self._handover = GuidedFlight(brief), Handover(brief)
+        self._following = Following(brief, calls_home=False)
+        self._guided = self._following.guided
         self._can_cover = brief.can_cover
         self._target: dict[str, int] = {}
 
@@ -46,14 +46,13 @@ class Targets:
             swarm: What the planner sees.
             choose: (swarm, index of the UAS, (W,) candidates, which it can cover) -> one of them.
         """
-        works = self._handover.workers(swarm)
-        if not self._guided.wanted(swarm.uncovered).any():
+        seen = self._following.update(swarm)
+        if not seen.wanted.any():
             return {name: GoTo(None) for name in swarm.active}
-        self._view.update(swarm)
-        blocked = self._view.blocked()
+        blocked = seen.blocked
         wanted = {
             swarm.names[u]: self._guided.wanted_of(swarm.uncovered, self._can_cover[u])
-            for u in np.flatnonzero(works)
+            for u in np.flatnonzero(swarm.status == FLYING)
         }
         self._target = {
             name: target
@@ -64,8 +63,7 @@ class Targets:
             if name not in self._target and mine.any():
                 candidates = self._candidates(mine, mine & ~blocked)
                 self._target[name] = choose(swarm, swarm.names.index(name), candidates)
-        home: dict[str, Command] = {name: GoTo(None) for name in swarm.active}
-        return home | self._guided.commands(swarm, self._target, blocked)
+        return self._following.towards(seen, self._target)
 
     @property
     def given_up(self) -> dict[int, str]:

@@ -184,11 +184,11 @@ def test_its_plans_come_true_in_a_wind_that_nobody_told_it(mean_mps, small_town)
     assert accomplished(flight)
     assert flight.violations == ()
     assert flight.breaches == 0
-    assert 0.0 < tour._off_mps.max() < 0.35  # of 0.6 m/s at which it would be guided
+    assert 0.0 < tour.flight.off_mps.max() < 0.35  # of 0.6 m/s at which it would be guided
 
 
 def test_it_is_guided_where_its_plans_do_not_come_true(small_town, monkeypatch):
-    monkeypatch.setattr("uas_coverage_baselines.tour.planner._OFF_MPS", 0.01)
+    monkeypatch.setattr("uas_coverage_baselines.tour.tour_flight._OFF_MPS", 0.01)
     tour, kinds = Tour(TourOptions(**QUICK)), []
     act = tour.act
 

@@ -8,7 +8,6 @@ from eventful import event, field
 from small_worlds import mover, waypoint
 from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.velocity.planner import LearnedVelocity
-from uas_coverage_agents.waypoint.planner import LearnedWaypoint
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
 
@@ -18,8 +17,8 @@ from uas_coverage_env.files.strict_toml import InputError, parse
 from uas_coverage_env.flight.metrics import accomplished, coverage, energy_Wh, home
 from uas_coverage_env.flight.record import MODES
 from uas_coverage_env.mission import first_sight
-from uas_coverage_env.mission.handover import SILENT_S
-from uas_coverage_env.mission.relaunch import Relaunch
+from uas_coverage_env.planning.around.handover import SILENT_S
+from uas_coverage_env.planning.around.relaunch import Relaunch
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.uas_coverage_v0 import parallel_env
 from uas_coverage_env.vehicle.layout import DOD
@@ -32,7 +31,6 @@ LOST_2 = event("uas_lost", LOST_AT_S, uas="uas_2")
 PLANNERS = {
     "tour": lambda: Tour(Tour.Options(moves=20_000, changes=60)),
     "trajectory": lambda: Trajectory(Trajectory.Options(orders=1, moves=20_000, programs=20)),
-    "learned-waypoint": lambda: LearnedWaypoint(LearnedWaypoint.Options(simulations=4)),
     "learned-route": lambda: LearnedRoute(LearnedRoute.Options(samples=4)),
     "learned-velocity": LearnedVelocity,
 }

@@ -17,7 +17,7 @@ HORIZON = 6
 STARTS = state((80.0, 60.0, -12.0)), state((90.0, 100.0, -12.0))
 WAYPOINTS = [((96.0, 62.0, -12.0), 6.0, 3.0), ((85.0, 80.0, -12.0), 35.0, 2.0)]
 WORTH = 2.0  # of the second
-EFFORT = Effort(deterministic=True, joint=None)
+EFFORT = Effort(joint=None)
 
 
 def two():
@@ -38,9 +38,7 @@ def plan_of(problem, uas, command, covered, blocks=OCP):
 
 def team_of(problem, plans, blocks=OCP):
     """What becomes of plans of which each UAS has one."""
-    search = TeamSearch(
-        problem, Effort(deterministic=True, joint=None), time.perf_counter(), blocks
-    )
+    search = TeamSearch(problem, EFFORT, time.perf_counter(), blocks)
     for uas, plan in enumerate(plans):
         search.collect(uas, [plan])
     search.combine([[], []])

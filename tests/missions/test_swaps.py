@@ -129,7 +129,7 @@ def test_before_take_off_each_waypoint_is_for_now_or_for_a_fresh_pack(
 ):
     made = planner(planner.Options(moves=20_000))
     made.reset(MissionBrief.of(with_charge(large_mission, charge)), 0)
-    order = made.mission_plan.order if planner is Trajectory else made._schedule.order
+    order = made.mission_plan.order if planner is Trajectory else made.flight.schedule.order
     visits = np.concatenate([*order.routes, order.later])
     assert sorted(visits.tolist()) == list(range(len(large_mission.waypoints)))
     assert len(order.later)
@@ -203,10 +203,10 @@ def test_a_planner_of_whole_missions_plans_on_without_a_reset(large_mission):
     assert planner.resets == 1
 
 
-def test_other_planners_are_told_the_mission_anew_and_flown_home_in_time(mission, flight):
+def test_other_planners_see_who_flies_again_and_are_flown_home_in_time(mission, flight):
     planner = CountedNearest()
     assert rollout(mission, planner).swaps == flight.swaps
-    assert planner.resets == 2 + len({swap.time_s for swap in flight.swaps})
+    assert planner.resets == 2  # to warm up, and at the start
     assert flight.return_mode
     assert flight.safety_filter
 

@@ -6,14 +6,13 @@ from small_worlds import meadow, waypoint
 
 pytest.importorskip("pyproj")
 
-from uas_coverage_baselines.by_legs.follower import LegFollower
-
 from uas_coverage_env import rollout
 from uas_coverage_env.operations import ExportOptions, make_export
 from uas_coverage_env.operations.clearance import Surroundings
 from uas_coverage_env.operations.mission_export.height_layers import LONG_WAITS_S, above, shifted
 from uas_coverage_env.operations.mission_export.lay_tracks import make_tracks
 from uas_coverage_env.operations.mission_export.tracks import Tolerances
+from uas_coverage_env.planning.execution.leg_follower import LegFollower
 from uas_coverage_env.scenario import Execution, Place
 
 HERE = Place(latitude_deg=47.0, longitude_deg=8.0)

@@ -2,20 +2,13 @@
 
 import numpy as np
 import pytest
+from backup_worlds import straight
 
-from uas_coverage_env.planning.backup import Course, Supervisor, are_apart, braked
+from uas_coverage_env.planning.backup import Supervisor, are_apart, braked
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
 from uas_coverage_env.vehicle import layout as S
 
 START = (60.0, 60.0, -20.0)
-
-
-def straight(start_m, velocity_mps, steps, begin=0, lands=True):
-    """A course at a steady velocity, a second a step."""
-    x = np.zeros((steps + 1, S.N_STATES))
-    x[:, :3] = np.array(start_m) + np.outer(np.arange(steps + 1), velocity_mps)
-    x[1:, S.VX : S.VZ + 1] = velocity_mps
-    return Course(begin, x, np.zeros((steps, S.N_INPUTS)), lands)
 
 
 def test_the_rest_of_a_course_begins_later_and_ends_when_it_ends():

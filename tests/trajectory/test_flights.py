@@ -14,8 +14,9 @@ from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
 from uas_coverage_baselines.trajectory.work import done
 
 from uas_coverage_env.geometry.segments import segment_clearance
+from uas_coverage_env.planning.backup import brake
 from uas_coverage_env.scenario import generate_scenario
-from uas_coverage_env.vehicle.layout import VX, VZ
+from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VZ, WX
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +47,20 @@ def test_what_is_flown_in_the_lpv_world_is_what_was_planned(flown):
     fleet, swarm, _, flight = flown
     course = course_of(fleet, 0, 0, swarm.x[0], flight)
     np.testing.assert_allclose(course.x[:, :3], flight.path_m, atol=1e-3)
+
+
+def test_braking_from_anywhere_along_a_flight_keeps_the_limits_of_the_vehicle(flown):
+    # so of planned states, not of all within the limits (tests/vehicle/test_inner_loop.py)
+    fleet, swarm, _, flight = flown
+    course = course_of(fleet, 0, 0, swarm.x[0], flight)
+    vehicle, largest = fleet.arena.vehicles[0], np.zeros(3)
+    assert np.hypot(*course.x[:, PHI : THETA + 1].T).max() > 0.9 * vehicle.tilt_max_rad
+    for x in course.x:
+        braking = brake(vehicle, np.ascontiguousarray(x), 14)[0]
+        pairs = braking[:, [[VX, VX + 1], [PHI, THETA], [WX, WX + 1]]]
+        largest = np.maximum(largest, np.linalg.norm(pairs, axis=2).max(axis=0))
+    limits = vehicle.v_xy_max_mps, vehicle.tilt_max_rad, vehicle.rate_max_radps
+    assert (largest <= 1.01 * np.array(limits)).all()
 
 
 def test_the_straight_segments_of_a_flight_clear_the_hulls(flown):

@@ -9,7 +9,7 @@ from uas_coverage_baselines.trajectory.flight_model import (
     in_wind,
     reduced_state,
 )
-from uas_coverage_baselines.trajectory.in_wind import InWind
+from uas_coverage_baselines.trajectory.in_wind import tour_in_wind
 from uas_coverage_baselines.trajectory.lead import Lead
 
 from uas_coverage_env import rollout
@@ -123,8 +123,7 @@ def test_what_leads_into_an_obstacle_is_not_flown():
 def test_flights_are_planned_ahead_in_light_wind(monkeypatch, mean_mps, leads):
     asked = []
     monkeypatch.setattr(Lead, "commands", lambda self, *args: asked.append(args))
-    in_any = InWind(0.3)
-    brief = MissionBrief.of(steady(mean_mps))
-    assert in_any.takes(brief, SearchEffort(1000), 0)
-    in_any.act(first_sight(brief))
+    tour, brief = tour_in_wind(SearchEffort(1000), 0.3), MissionBrief.of(steady(mean_mps))
+    tour.reset(brief, 0)
+    tour.act(first_sight(brief))
     assert bool(asked) == leads

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-import uas_coverage_baselines.trajectory.planner as planner_module
 import uas_coverage_baselines.trajectory.program as program_module
+import uas_coverage_baselines.trajectory.replanning as planner_module
 from small_fleets import FIELD, HOUSE, TOWER, field
 from small_worlds import box, meadow, mover, waypoint
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
@@ -232,7 +232,7 @@ def test_no_uas_flies_faster_than_it_is_told_to():
     fast = MissionBrief.of(scenario).vehicles[0].limits.v_xy_max_mps
     slow = planner(speed_share=0.5)
     slow.reset(MissionBrief.of(scenario), 0)
-    level_mps = np.hypot(*slow._planned[0].course.x[:, VX : VX + 2].T)
+    level_mps = np.hypot(*slow.in_force.planned[0].course.x[:, VX : VX + 2].T)
     assert 0.45 * fast < level_mps.max() <= 0.5 * fast
 
 
@@ -240,7 +240,7 @@ def test_most_of_a_large_fleet_fly_where_that_makes_the_mission_shorter():
     town = MissionBrief.of(generate_scenario(1, n_uas=8, n_waypoints=100, n_obstacles=6))
     eight = planner(programs=1, moves=100_000)
     eight.reset(town, 0)
-    assert len(eight._planned) >= 5
+    assert len(eight.in_force.planned) >= 5
 
 
 def test_a_uas_that_stays_at_home_is_in_no_ones_way():

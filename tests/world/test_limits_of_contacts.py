@@ -20,6 +20,8 @@ CENTRE_M, PER_STEP_M = np.array([40.0, 150.0, -20.0]), np.array([2.0, -1.0, 0.5]
 WALL = box("wall", (100.0, 20.0, -30.0), (110.0, 40.0, 0.0), 2.0)
 FAR_M = np.array([[160.0, 60.0, -20.0], [60.0, 60.0, -20.0], [180.0, 120.0, -20.0]])
 BIT_M = 1e-7
+BREACHES = ((-2e-9, 1), (-5e-10, 0))
+"""Of a distance short by so much [m], whether it is one: the last digits do not count."""
 
 
 def scene(**more):
@@ -217,7 +219,8 @@ def test_a_no_fly_zone_is_too_near_but_touches_no_uas_and_what_stands_in_it_does
 @pytest.mark.parametrize("place", WALLS)
 def test_a_wall_is_too_near_within_its_safe_distance_beyond_the_radius(place):
     world = scene()
-    for gap_m, breaches in ((LARGE_M + 2.0 - BIT_M, 1), (LARGE_M + 2.0 + BIT_M, 0)):
+    for more_m, breaches in BREACHES:
+        gap_m = LARGE_M + 2.0 + more_m
         middle_m, _ = place(gap_m)
         world.state.x[1, :3] = middle_m
         assert judged(world)["breaches"].tolist() == [0, breaches, 0]
@@ -227,7 +230,8 @@ def test_a_wall_is_too_near_within_its_safe_distance_beyond_the_radius(place):
 def test_what_moves_is_too_near_where_it_is_at_the_sample(place):
     world = scene()
     size_m = cylinder_size(place, 4.0, 3.0)
-    for gap_m, breaches in ((SMALL_M + 3.0 - BIT_M, 1), (SMALL_M + 3.0 + BIT_M, 0)):
+    for more_m, breaches in BREACHES:
+        gap_m = SMALL_M + 3.0 + more_m
         middle_m, _ = place(size_m + gap_m)
         world.state.x[0, :3] = CENTRE_M + PER_STEP_M + middle_m
         assert judged(world)["breaches"].tolist() == [breaches, 0, 0]
@@ -237,8 +241,8 @@ def test_what_moves_is_too_near_where_it_is_at_the_sample(place):
 def test_two_uas_are_too_near_within_their_distance_beyond_both_radii(place):
     world = scene()
     both_m = SMALL_M + LARGE_M + 5.0
-    for gap_m, breaches in ((both_m - BIT_M, 1), (both_m + BIT_M, 0)):
-        middle_m, _ = place(gap_m)
+    for more_m, breaches in BREACHES:
+        middle_m, _ = place(both_m + more_m)
         world.state.x[0, :3] = world.state.x[1, :3] + middle_m
         assert judged(world)["breaches"].tolist() == [breaches, breaches, 0]
     # from one that is lost no distance is kept

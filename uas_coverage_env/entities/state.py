@@ -185,6 +185,8 @@ class SwarmState:
             where none is (`again_after_s`).
         filtered: (U,) the safety filter replaced its last command: it is elsewhere than that would
             have taken it, which no disturbance did; empty where it is not told.
+        away: (U,) flies, but takes no commands, and is therefore shown to planners as landed: to be
+            kept clear of; empty where none is.
     """
 
     time_s: float
@@ -205,6 +207,7 @@ class SwarmState:
     ground_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     again_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     filtered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+    away: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
 
     @property
     def heading_rad(self) -> NDArray[np.float64]:

@@ -15,7 +15,6 @@ from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
 from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.entities.commands import pack
-from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.policy.interface import MissionInterface
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
@@ -31,7 +30,8 @@ from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.interruptions import signals_noted
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.mission.relaunch import Relaunch
+from uas_coverage_env.planning.around import Around
+from uas_coverage_env.planning.around.relaunch import Relaunch
 from uas_coverage_env.plugins.installed import version_of
 from uas_coverage_env.plugins.users_code import described, place_of
 from uas_coverage_env.scenario import Scenario, load_scenario
@@ -92,8 +92,8 @@ def rollout(
         seed: The seed of the planner and of what disturbances draw.
         dynamics: `lpv` or `nonlinear`.
         return_mode: Let the world bring UAS home in time; None: as the planner asks, and unless it
-            refuses, where something pushes back (wind, wrong models, sensors, events) or UAS swap
-            packs while the others fly on.
+            refuses, where something pushes back (wind, wrong models, sensors, events), or UAS swap
+            packs while the others fly on and the planner does not plan so far ahead (`is_idle`).
         safety_filter: Let the world keep commands clear of harm; None: likewise.
         max_steps: Stop after so many steps; None, or more than the scenario's: the scenario's.
         disturbances: What pushes back; None: what the scenario says. Others than those of the
@@ -118,15 +118,14 @@ def rollout(
     assistants: Assistants = getattr(planner, "assistants", Assistants())
     # no plan is verified against what pushes back, nor one of legs against what moves
     by_legs = scenario.execution is not None
-    plans_on = not by_legs and getattr(planner, "plans_on_after_swaps", False)
-    # in the air a plan that is made anew may come too late for the charge that is left
-    made_anew = swaps_alone(scenario) and not plans_on
-    uncertain = _is_uncertain(scenario, disturbances) or made_anew
+    # whoever looks no farther than the next waypoint is called home for a fresh pack
+    called = swaps_alone(scenario) and not hasattr(planner, "is_idle")
+    uncertain = _is_uncertain(scenario, disturbances) or called
     if return_mode is None:
         return_mode = assistants.return_mode
         # return mode would fly home another way than the file
-        comes_home = by_legs and getattr(planner, "comes_home_by_legs", False)
-        if return_mode is None or (return_mode and comes_home):
+        sends = getattr(planner, "goes_to", False) or hasattr(planner, "routes")
+        if return_mode is None or (return_mode and by_legs and sends):
             return_mode = uncertain
     if safety_filter is None:
         safety_filter = assistants.safety_filter
@@ -146,7 +145,8 @@ def rollout(
         if reward or reward_weights:
             paid = MissionSettings(reward=tuple(reward), reward_weights=reward_weights)
             meter = MissionInterface(world, paid)
-        _make_ready(world, meter, planner, MissionBrief.of(scenario), seed)
+        flown_by = _Seat(planner)
+        _make_ready(world, meter, flown_by, MissionBrief.of(scenario), seed)
 
     limit = scenario.max_steps if max_steps is None else min(max_steps, scenario.max_steps)
     log = FlightLog(world, scenario, meter)
@@ -181,19 +181,25 @@ def rollout(
             return interrupted() or (should_stop is not None and should_stop())
 
         try:
-            ended = _fly(world, planner, log, limit, seed, tell, stops, plans_on=plans_on)
+            ended = _fly(world, flown_by, log, limit, seed, tell, stops)
         except PlannerError as error:
             error.flight = flown() if log.steps else None
             raise
-    return _with_reasons(flown(ended), planner)
+    return _with_reasons(flown(ended), flown_by.around.given_up)
 
 
-def _with_reasons(flight: Flight, planner: Planner) -> Flight:
+def _with_reasons(flight: Flight, said: Mapping[int, str]) -> Flight:
     """The flight with why it has left waypoints open."""
     if not open_waypoints(flight):
         return flight
-    said = getattr(planner, "given_up", {})
     return dataclasses.replace(flight, left_open=left_open(flight, said))
+
+
+class _Seat:
+    """A planner, by which errors are named, and the same with what is done round it."""
+
+    def __init__(self, planner: Planner) -> None:
+        self.planner, self.around = planner, Around(planner)
 
 
 def _is_uncertain(scenario: Scenario, disturbances: Sequence[MissionFeature] | None) -> bool:
@@ -204,10 +210,10 @@ def _is_uncertain(scenario: Scenario, disturbances: Sequence[MissionFeature] | N
 
 
 def _make_ready(
-    world: World, meter: MissionInterface | None, planner: Planner, brief: MissionBrief, seed: int
+    world: World, meter: MissionInterface | None, seat: _Seat, brief: MissionBrief, seed: int
 ) -> None:
     """Compile what world and planner begin with, then put both at the start."""
-    state = world.swarm_state()
+    state, planner = world.swarm_state(), seat.planner
     stay: dict[str, Command] = dict.fromkeys(state.names, GoTo(None))
     if not getattr(planner, "goes_to", False):
         stay = {name: Velocity(0.0, 0.0, -state.x[i, Z]) for i, name in enumerate(state.names)}
@@ -216,11 +222,9 @@ def _make_ready(
     if meter is not None:
         meter.reward_terms(packed, outcome)
     world.reset()
-    warm_up = getattr(planner, "warm_up", None)
     try:
-        if warm_up is not None:
-            warm_up(brief)
-        planner.reset(brief, seed)
+        seat.around.warm_up(brief)
+        seat.around.reset(brief, seed)
     except ValueError as error:
         where = "" if isinstance(error, InputError) else place_of(error)
         reason = f"planner {name_of(planner)!r} refuses scenario {brief.name!r}: {error}{where}"
@@ -231,14 +235,12 @@ def _make_ready(
 
 def _fly(
     world: World,
-    planner: Planner,
+    seat: _Seat,
     log: FlightLog,
     limit: int,
     seed: int,
     tell: Callable[[SwarmState, float | None], None],
     should_stop: Callable[[], bool],
-    *,
-    plans_on: bool,
 ) -> str:
     """Fly until the end; returns how it came about, see `Flight.ended`."""
     swarm, revisions, relaunch = world.swarm_state(), 0, _relaunch(world)
@@ -248,19 +250,15 @@ def _fly(
             return "steps"
         if should_stop():
             return "stopped"
-        commands, packed, took = _decide(planner, swarm)
+        commands, packed, took = _decide(seat, swarm)
         outcome = _stepped(world, packed)
-        with _blamed(planner, swarm):
-            found = getattr(planner, "last_decision", None) if swarm.active else None
+        found = seat.around.last_decision if swarm.active else None
         log.add(commands, packed, took, found, outcome)
         before, swarm = swarm, world.swarm_state()
         changed = world.revisions != revisions
         if changed:
             revisions = world.revisions
             relaunch = _relaunch(world)
-        if not plans_on:
-            # a UAS flies again, with a fresh pack
-            changed |= bool(((before.status == LANDED) & (swarm.status == FLYING)).any())
         more = world.known.asks_again and len(swarm.uncovered) > len(before.uncovered)
         again = None
         if relaunch and log.steps < limit:
@@ -269,8 +267,8 @@ def _fly(
             world.take_off(again)
             swarm, changed = world.swarm_state(), True
         if changed:
-            with _blamed(planner, swarm):
-                planner.reset(MissionBrief.of(world.known), seed)
+            with _blamed(seat.planner, swarm):
+                seat.around.reset(MissionBrief.of(world.known), seed)
         tell(swarm, took.wall_s)
     return "complete"
 
@@ -290,14 +288,15 @@ def _relaunch(world: World) -> Relaunch | None:
 
 
 def _decide(
-    planner: Planner, swarm: SwarmState
+    seat: _Seat, swarm: SwarmState
 ) -> tuple[Mapping[str, Command], NDArray[np.void], Taken]:
     """One decision, checked and timed; none is asked for while all swap packs."""
     if not swarm.active:
         return {}, pack({}, swarm.names, (), len(swarm.uncovered)), Taken()
+    planner = seat.planner
     with _blamed(planner, swarm):
         started_s, busy_s = _worked_s(), _busy_s()
-        commands = planner.act(swarm)
+        commands = seat.around.act(swarm)
         took = Taken(_worked_s() - started_s, max(_busy_s() - busy_s, 0.0))
     try:
         return commands, pack(commands, swarm.names, swarm.active, len(swarm.uncovered)), took

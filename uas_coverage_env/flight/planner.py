@@ -26,19 +26,20 @@ class Assistants:
 class Planner(Protocol):
     """Anything that flies a swarm: two methods are all that is needed.
 
-    A rollout reads more where a planner has it:
+    What a mission asks for beside planning is done round it, see `planning.around.Around`. More is
+    read where a planner has it:
 
     - `warm_up(brief)`: compiles what needs compiling; called once, before `reset`, untimed.
     - `last_decision`: a `Decision` about the last `act`, or None.
     - `given_up`: waypoint (its index) -> why it is left open, in a few words; asked for at the end
       of a flight that has left some open (`Flight.left_open`).
     - `assistants`: the `Assistants` it wants to fly with, unless the caller says otherwise.
-    - `comes_home_by_legs`: whether, where an autopilot is to fly the mission (`[execution]`), it
-      brings UAS home by itself, so that return mode is not needed.
-    - `plans_on_after_swaps`: whether `act` takes in a UAS that flies again with a fresh pack
-      (`[sorties]` with `together = false`); otherwise `reset` is called then, as after a change of
-      the scene, and both assistants fly along unless the caller says otherwise.
-    - `goes_to`: whether it begins with a `GoTo`: the world's guidance is then compiled before the
+    - `routes`: (U,) the waypoints of each UAS, in order, at the last `reset` or `act`; along these
+      an autopilot flies (`[execution]`). None: it has none.
+    - `is_idle(swarm)`: whether a UAS flies that has nothing more to visit; a planner that has it is
+      shown before the time which waypoints are asked for again (`SwarmState.again_s`), and brings
+      UAS home for fresh packs by itself (`[sorties]` with `together = false`).
+    - `goes_to`: whether it sends UAS by `GoTo`: the world's guidance is then compiled before the
       first decision, otherwise when such a command first comes; neither counts as time of it.
     - `is_learner`: whether its wrenches are judged as those of learners in environments, see
       `docs/rules.md`.

@@ -2,7 +2,6 @@
 
 from uas_coverage_env.mission.brief import MissionBrief, MovingObstacleBrief
 from uas_coverage_env.mission.range import Range, ReturnEstimate
-from uas_coverage_env.mission.repeats import Repeats
 from uas_coverage_env.mission.views import WorldView, first_sight
 from uas_coverage_env.mission.ways import Ways
 
@@ -10,7 +9,6 @@ __all__ = [
     "MissionBrief",
     "MovingObstacleBrief",
     "Range",
-    "Repeats",
     "ReturnEstimate",
     "Ways",
     "WorldView",

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission.blocked import find_blocked
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.simulation import World
@@ -38,6 +39,8 @@ class WorldView:
         state.x[:] = swarm.x
         state.uas["reference_mps"][:] = swarm.reference_mps
         state.uas["status"][:] = swarm.status
+        if len(swarm.away):
+            state.uas["status"][swarm.away] = FLYING
         state.uas["departed"][:] = swarm.departed
         state.uas["returning"][:] = swarm.returning
         state.uncovered[:] = swarm.uncovered

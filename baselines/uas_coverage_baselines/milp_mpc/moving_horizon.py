@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence, Set
 from typing import Generic, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
@@ -26,13 +25,12 @@ from uas_coverage_baselines.milp_mpc.silent_uas import SilentUas
 from uas_coverage_baselines.milp_mpc.steering import Steering
 from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.entities.commands import HOME, Mode
-from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.mission.attempts import Attempts
-from uas_coverage_env.mission.handover import Handover, without
 from uas_coverage_env.mission.refusal import refuse_what_asks
-from uas_coverage_env.world import Command, GoTo, SwarmState
+from uas_coverage_env.planning.around.handover import away_of
+from uas_coverage_env.world import Command, SwarmState
 
 _CAREFUL_WITHIN_M = 40.0  # of home a UAS that does not come nearer to it flies slowly
 
@@ -112,7 +110,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self._round_robin = RoundRobin()
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
-        self._attempts, self._handover = Attempts(brief), Handover(brief)
+        self._attempts = Attempts(brief)
         self._silent_uas = SilentUas(brief, self.options.moving_margin_m)
         self._called = set[str]()  # UAS whose plans have left no charge but for the way home
         self.last_decision = None
@@ -121,23 +119,14 @@ class MovingHorizon(ABC, Generic[Chosen]):
         """Decide for every active UAS: one step of Algorithm 1."""
         if not swarm.active:
             return {}
-        silent = (swarm.status == FLYING) & ~self._handover.workers(swarm)
-        if self._steering is None:
-            commands = self._of_workers(without(swarm, silent), swarm, silent)
-        else:
-            commands = self._steering.commands(without(swarm, silent))
-            self.last_decision = Decision({})
-        home = {swarm.names[u]: GoTo(None) for u in np.flatnonzero(silent)}
-        return {**commands, **home}
-
-    def _of_workers(
-        self, swarm: SwarmState, whole: SwarmState, silent: NDArray[np.bool_]
-    ) -> Mapping[str, Command]:
-        """Decide for those that take commands, the silent ones (U,) of the whole in their way."""
+        if self._steering is not None:
+            self.last_decision = Decision()
+            return self._steering.commands(swarm)
         began, self._returning_home = time.perf_counter(), frozenset[str]()
         wanted = self._attempts.wanted(swarm.uncovered)
         seen = swarm if wanted is swarm.uncovered else dataclasses.replace(swarm, uncovered=wanted)
-        problem = self._silent_uas.beside(self.problem(seen), whole, silent)
+        problem = self._silent_uas.beside(self.problem(seen), swarm, away_of(swarm))
+        self._called &= set(swarm.active)  # with a fresh pack it need not fly home
         if any(plan and set(problem.names) - set(plan.names) for plan in (self.plan, self._backup)):
             self.plan = self._backup = None  # one that is back has a part in neither
         overruled = self._overruled(problem, swarm)

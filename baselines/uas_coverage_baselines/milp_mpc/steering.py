@@ -16,8 +16,8 @@ from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
 from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.mission.guided_flight import GuidedFlight
-from uas_coverage_env.world import Command, GoTo, SwarmState
+from uas_coverage_env.planning.following import Following
+from uas_coverage_env.world import Command, SwarmState
 
 
 class Steering:
@@ -33,15 +33,14 @@ class Steering:
         builder = ProblemBuilder(brief, options)
         self._guide = RouteGuide(brief, builder, TourShape())
         self._guide.begin(first_sight(brief), seed)
-        self._guided = GuidedFlight(brief)
+        self._following = Following(brief, calls_home=False)
 
     def commands(self, swarm: SwarmState) -> Mapping[str, Command]:
         """A command for each UAS that flies and takes commands."""
-        wanted = self._guided.wanted(swarm.uncovered)
-        self._guide.update(replace(swarm, uncovered=wanted))
+        seen = self._following.update(swarm)
+        self._guide.update(replace(swarm, uncovered=seen.wanted))
         ahead = dict(zip(swarm.active, self._guide.tours(swarm.active), strict=True))
-        flown_to = {name: int(route[0]) for name, route in ahead.items() if len(route)}
+        targets = {name: int(route[0]) for name, route in ahead.items() if len(route)}
         blocked = np.zeros(len(swarm.uncovered), np.bool_)
         blocked[list(self._guide.blocked)] = True
-        home: dict[str, Command] = {name: GoTo(None, "return") for name in swarm.active}
-        return home | self._guided.commands(swarm, flown_to, blocked)
+        return self._following.towards(replace(seen, blocked=blocked), targets)

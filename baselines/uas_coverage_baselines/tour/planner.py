@@ -2,60 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import Protocol
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from uas_coverage_baselines.by_legs.mission import LegMission
-from uas_coverage_baselines.tour.cost import SAFE_BELOW_S, SLOWER
-from uas_coverage_baselines.tour.flight_plan import improve
-from uas_coverage_baselines.tour.pursuit import LEGS, PursuitTask, brake_seconds, empty_plan
-from uas_coverage_baselines.tour.schedule import Schedule, View
-from uas_coverage_env.entities.commands import COMMAND_DTYPE
-from uas_coverage_env.entities.state import FLYING
+from uas_coverage_baselines.tour.tour_flight import MakeLeader, TourFlight
 from uas_coverage_env.flight import AssistedOptions
-from uas_coverage_env.mission import MissionBrief, Repeats, WorldView, first_sight
-from uas_coverage_env.mission.guided_flight import GuidedFlight
-from uas_coverage_env.mission.handover import Handover, without
-from uas_coverage_env.mission.learnt_wind import LearntWind, in_disturbances
-from uas_coverage_env.mission.recall import Recall
+from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.planning.decision import Decision
-from uas_coverage_env.planning.routing import Routes, SearchEffort
-from uas_coverage_env.vehicle import layout as S
-from uas_coverage_env.world import Arena, Command, GoTo, SwarmState, Velocity
+from uas_coverage_env.planning.following.leg_order import LegOrder
+from uas_coverage_env.planning.routing import SearchEffort
+from uas_coverage_env.world import Command, SwarmState
 
-FloatArray = NDArray[np.float64]
-_HORIZON_S = 8.0  # a longer plan has more in it than so many changes can improve
-_STEPS_AT_MOST = 60
-_COVERED_WITHIN_M = 0.3  # nearer than the radius by this, or by a fiftieth of it
-_NEAR = 0.7  # share of the radius at which the leg to a waypoint is expected to end
-_FROM_WITHIN = 0.8  # share of the radius from within which a waypoint is covered, beside what moves
-_WAITING_M = 100.0  # how far from a blocked waypoint to wait: what blocks it may set off
-_PER_WAYPOINT_S = 5.0  # what a turn takes beyond that: there is no gain in putting one off
-_MOVING_MARGIN_M = 6.0
 _LEG_SEARCHES = 3
-_SURPRISE_MPS = 0.3  # a larger deviation means that another flew: the filter, return mode
-_OFF_MPS = 0.6  # a mean deviation with which no plan comes true
-_OFF_SHARE = 0.1  # of the last step in that mean
-
-
-class Leader(Protocol):
-    """Plans in a wind what `Tour` flies where it is safe."""
-
-    def commands(
-        self,
-        uas: int,
-        step: int,
-        x: FloatArray,
-        route: NDArray[np.int64],
-        learnt: LearntWind,
-        n_steps: int,
-    ) -> FloatArray | None:
-        """(N, 3) velocities north and east [m/s], and altitudes [m]; None: no plan."""
 
 
 class TourOptions(AssistedOptions):
@@ -90,22 +51,21 @@ class Tour:
     """
 
     Options = TourOptions
-    comes_home_by_legs = True
     goes_to = True
 
     def __init__(
         self,
         options: TourOptions | None = None,
         effort: SearchEffort | None = None,
-        make_leader: Callable[[MissionBrief, Arena], Leader | None] | None = None,
+        make_leader: MakeLeader | None = None,
     ) -> None:
         self.options = options or TourOptions()
-        self._effort = effort or SearchEffort(self.options.moves)
+        self.effort = effort or SearchEffort(self.options.moves)
         self._make_leader = make_leader
         self.assistants = self.options.assistants
         self.last_decision: Decision | None = None
+        self.flight: TourFlight | LegOrder | None = None
         self._has_acted = False
-        self._repeats: Repeats | None = None
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile everything."""
@@ -115,222 +75,34 @@ class Tour:
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Search the order from the starts; that of a mission under way, when it goes on."""
-        repeats = self._repeats if self._has_acted and seed == self._seed else None
-        if repeats is not None and repeats.goes_on(brief):
-            return
-        self._repeats = Repeats.of(brief) if brief.execution is None else None
-        brief = brief if self._repeats is None else self._repeats.brief
-        self._flown: Routes | None = None
-        if may_go_on := self._has_acted and self._by_legs is None:
-            self._flown = self._schedule.order
-        self._has_acted, self._seed = False, seed
-        self._by_legs: LegMission | None = None
+        flew = self.flight if isinstance(self.flight, TourFlight) and self._has_acted else None
+        self._has_acted = False
         if brief.execution is not None:
-            self._by_legs = LegMission(brief, _LEG_SEARCHES, self._effort, seed)
+            self.flight = LegOrder(brief, _LEG_SEARCHES, self.effort, seed)
             return
-        self._world, self._handover = WorldView(brief), Handover(brief)
-        self._arena = self._world.arena
-        self._learnt: LearntWind | None = None
-        if brief.conditions is not None:
-            self._learnt, self._arena = LearntWind(brief), in_disturbances(self._arena)
-        self._leader: Leader | None = None
-        if self._make_leader is not None:
-            self._leader = self._make_leader(brief, self._arena)
-        n_uas = len(brief.uas)
-        self._n_steps = min(max(round(_HORIZON_S / brief.dt_s), 1), _STEPS_AT_MOST)
-        self._rng = np.random.default_rng([seed, n_uas])
-        self._command = np.zeros(1, dtype=COMMAND_DTYPE)[0]
-        self._plans = [empty_plan(self._n_steps) for _ in range(n_uas)]
-        for plan, uas in zip(self._plans, brief.uas, strict=True):
-            plan.path_m[:] = uas.start_m
-        self._trial = empty_plan(self._n_steps)
-        self._is_flown = np.zeros(n_uas, np.bool_)
-        self._guided, self._off_mps = GuidedFlight(brief), np.zeros(n_uas)
-        self._aimed_at: list[NDArray[np.int64]] = [np.zeros(0, np.int64)] * n_uas
-        self._brake_s = [brake_seconds(self._arena, i, self._command) for i in range(n_uas)]
-        self._recall, self._returns = Recall(n_uas), np.zeros(n_uas, np.bool_)
-        self._radius_m = self._arena.waypoints["radius_m"].copy()
-        self._schedule = Schedule(brief, self._effort)
-        self._brief, self._has_order = brief, not may_go_on
-        if self._has_order:
-            self._find_order(self._view(first_sight(brief)), seed)
+        self.flight = TourFlight(
+            brief, self.options.changes, self.effort, seed, self._make_leader,
+            flown=None if flew is None else flew.schedule.order, goes_on=flew is not None,
+        )  # fmt: skip
+
+    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
+        """Plan for each flying UAS, in order, and fly the first command of each plan."""
+        assert self.flight is not None
+        self._has_acted = True
+        commands = self.flight.act(swarm)
+        self.last_decision = self.flight.decision
+        return commands
+
+    @property
+    def routes(self) -> Sequence[NDArray[np.int64]] | None:
+        """(U,) waypoints of each UAS where an autopilot flies; None: plans are flown."""
+        return self.flight.routes if isinstance(self.flight, LegOrder) else None
+
+    def is_idle(self, swarm: SwarmState) -> bool:
+        """Whether a UAS flies home, with no visit left."""
+        return not isinstance(self.flight, LegOrder | None) and self.flight.is_idle(swarm)
 
     @property
     def given_up(self) -> dict[int, str]:
         """Waypoints that are left out or given up, and why in a few words."""
-        if self._by_legs is not None:
-            return {}
-        left_out = self._schedule.order.left_out.tolist()
-        return dict.fromkeys(left_out, "its order leaves it out") | self._guided.given_up
-
-    def act(self, swarm: SwarmState) -> Mapping[str, Command]:
-        """Plan for each flying UAS, in order, and fly the first command of each plan."""
-        if self._repeats is not None:
-            if self._has_acted and swarm.step == 0:  # the same mission once more
-                self._has_acted = False
-                self.reset(self._brief, self._seed)
-            swarm = self._repeats.seen(swarm, self._is_idle(swarm))
-        self._has_acted = True
-        if self._by_legs is not None:
-            self.last_decision = None
-            return self._by_legs.commands(swarm)
-        if self._learnt is not None:
-            self._learnt.see(swarm)
-        view = self._view(replace(swarm, uncovered=self._guided.wanted(swarm.uncovered)))
-        if not self._has_order:
-            self._go_on(view, swarm.step)
-        self._schedule.update(view)
-        others_m = self._where_others_go(view)
-        commands: dict[str, Command] = {}
-        predicted_m: dict[str, FloatArray] = {}
-        for i in np.flatnonzero(view.flies).tolist():
-            name = swarm.names[i]
-            commands[name] = self._fly(i, view, others_m, swarm)
-            predicted_m[name] = others_m[i].copy()
-        self.last_decision = Decision(predicted_m)
-        commands |= self._guided.commands(swarm, self._guided_to(swarm), _closed(view))
-        return commands if self._repeats is None else self._repeats.addressed(commands)
-
-    def _is_idle(self, swarm: SwarmState) -> bool:
-        """Whether a UAS flies home, with no visit left."""
-        routes = self._schedule.order.routes
-        return any(not len(routes[i]) for i in np.flatnonzero(swarm.status == FLYING))
-
-    def _guided_to(self, swarm: SwarmState) -> dict[str, int]:
-        """The waypoints that UAS fly to whose plans do not come true."""
-        routes = self._schedule.order.routes
-        flying = np.flatnonzero(self._is_guided & (swarm.status == FLYING) & ~self._returns)
-        return {swarm.names[i]: int(routes[i][0]) for i in flying if len(routes[i])}
-
-    @property
-    def _is_guided(self) -> NDArray[np.bool_]:
-        """(U,) whose plans do not come true, in spite of what is learnt of the wind."""
-        return self._off_mps > _OFF_MPS
-
-    def _find_order(self, view: View, seed: int) -> None:
-        self._schedule.begin(view, seed)
-
-    def _go_on(self, view: View, step: int) -> None:
-        """Have an order for a mission whose scene is another, or for a new one."""
-        self._has_order = True
-        if step > 0 and self._flown is not None:
-            self._schedule.go_on(view, self._flown)
-        else:
-            self._find_order(self._view(first_sight(self._brief)), self._seed)
-
-    def _fly(self, i: int, view: View, others_m: FloatArray, swarm: SwarmState) -> Command:
-        task = self._task(i, view)
-        plan, x = self._plans[i], view.x[i]
-        n_kept = self._catch_up(i, x, task.route, swarm)
-        belief = None if self._learnt is None else self._learnt.belief[i]
-        is_guided = self._is_guided[i]
-        changes = 0 if is_guided else self.options.changes
-        seconds = improve(
-            self._arena, i, task, others_m, plan, self._trial, n_kept, changes, self._rng,
-            self._command, belief, self._led(i, x, task, swarm.step),
-        )  # fmt: skip
-        others_m[i] = plan.path_m
-        mode = "covering" if len(task.route) else "return"
-        # in wind the first step is a hover, for a first look at it
-        looks = self._learnt is not None and swarm.step == 0
-        self._is_flown[i] = seconds < SAFE_BELOW_S and not is_guided and not looks
-        if not self._is_flown[i]:
-            return GoTo(int(task.route[0]) if len(task.route) else None, mode)
-        north_mps, east_mps, altitude_m = plan.commands[0].tolist()
-        return Velocity(north_mps, east_mps, altitude_m, mode)
-
-    def _led(self, i: int, x: FloatArray, task: PursuitTask, step: int) -> FloatArray | None:
-        """What is flown where it is safe, (0, 3) where there is no plan; None: in still air."""
-        if self._learnt is None:
-            return None
-        led = None
-        if self._leader is not None and not self._is_guided[i] and (task.cover_m >= 0.0).all():
-            led = self._leader.commands(i, step, x, task.route, self._learnt, self._n_steps)
-        return np.zeros((0, 3)) if led is None else led
-
-    def _task(self, i: int, view: View) -> PursuitTask:
-        schedule = self._schedule
-        route = schedule.order.routes[i]
-        if self._returns[i]:
-            route = route[:0]
-        radius_m, blocked = self._radius_m[route], view.blocked[route]
-        within_m = radius_m - np.minimum(_COVERED_WITHIN_M, radius_m / 50.0)
-        return PursuitTask(
-            np.ascontiguousarray(route),
-            np.where(_closed(view)[route], -1.0, within_m),
-            np.append(np.where(blocked, _WAITING_M, _NEAR * radius_m), 0.0),
-            schedule.rest_s(i, SLOWER, _PER_WAYPOINT_S) if len(route) else np.zeros(1),
-            schedule.legs.acceleration_mps2[i],
-            self._brake_s[i],
-            _MOVING_MARGIN_M,
-        )
-
-    def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64], swarm: SwarmState) -> int:
-        """Move what is left of the plan one step on; how many of its legs still hold."""
-        plan = self._plans[i]
-        off_mps = float(np.abs((plan.x[1] - x)[S.VX : S.VZ + 1]).max())
-        if self._learnt is None:
-            as_planned = self._is_flown[i] and off_mps < _SURPRISE_MPS
-            plan.reference[0] = plan.reference[1] if as_planned else x[S.VX : S.VY + 1]
-        else:
-            filtered = len(swarm.filtered) > 0 and swarm.filtered[i]
-            as_planned = self._is_flown[i] and not filtered and not swarm.returning[i]
-            plan.reference[0] = swarm.reference_mps[i]
-            if as_planned:
-                self._off_mps[i] += _OFF_SHARE * (off_mps - self._off_mps[i])
-        plan.x[0] = x
-        plan.push[:-1], plan.share[:-1] = plan.push[1:].copy(), plan.share[1:].copy()
-        plan.push[-1], plan.share[-1] = 0.0, 1.0
-        if not as_planned:
-            plan.push[:], plan.share[:] = 0.0, 1.0
-        before = self._aimed_at[i]
-        self._aimed_at[i] = route[:LEGS]
-        if not len(route) or not len(before):
-            return 0
-        # what was aimed at before and is still ahead
-        found = np.flatnonzero(before == route[0])
-        if not len(found):
-            return 0
-        gone = int(found[0])
-        for values in (plan.aim_m, plan.early_m):
-            values[: LEGS - gone] = values[gone:].copy()
-        still = before[gone:]
-        n_same = min(len(still), len(route))
-        same = still[:n_same] == route[:n_same]
-        return n_same if same.all() else int(same.argmin())
-
-    def _where_others_go(self, view: View) -> FloatArray:
-        """(U, N+1, 3) [m] as planned before, one step on; NaN where none is flying."""
-        paths_m = np.full((len(view.x), self._n_steps + 1, 3), np.nan)
-        for i in np.flatnonzero(view.flies).tolist():
-            path_m = self._plans[i].path_m
-            paths_m[i, :-1] = path_m[1:]
-            paths_m[i, -1] = path_m[-1]
-            # where it is now is known
-            if np.linalg.norm(paths_m[i, 0] - view.x[i, :3]) > 1.0:
-                paths_m[i] = view.x[i, :3]
-        return paths_m
-
-    def _view(self, swarm: SwarmState) -> View:
-        self._world.update(swarm)
-        flies = swarm.status == FLYING
-        if self._repeats is not None:
-            self._recall.keep(swarm.departed & (not self._repeats.has_grown))
-        self._returns = self._recall.update(swarm, self._world)
-        works = self._handover.workers(swarm)
-        return View(
-            x=swarm.x,
-            may_work=works & ~self._returns,
-            flies=flies,
-            uncovered=swarm.uncovered,
-            blocked=self._world.blocked(_FROM_WITHIN, _FROM_WITHIN, _MOVING_MARGIN_M),
-            time_s=swarm.time_s,
-            swarm=without(swarm, flies & ~works) if len(swarm.packs_left) else None,
-            asked_in_s=None if self._repeats is None else self._repeats.asked_in_s,
-            wind_mps=None if self._learnt is None else self._learnt.mean_mps,
-        )
-
-
-def _closed(view: View) -> NDArray[np.bool_]:
-    """(W,) waypoints that cannot be covered yet."""
-    return view.blocked if view.asked_in_s is None else view.blocked | (view.asked_in_s > 0.0)
+        return {} if self.flight is None else self.flight.given_up

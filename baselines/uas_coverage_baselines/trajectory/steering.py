@@ -8,22 +8,15 @@ on under the world's guidance.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.trajectory.fleet import Fleet, Moment
-from uas_coverage_env.mission import MissionBrief, WorldView
-from uas_coverage_env.mission.guided_flight import GuidedFlight
-from uas_coverage_env.mission.recall import Recall
-from uas_coverage_env.planning.routing import Routes, SearchEffort, improve_routes
-from uas_coverage_env.world import Command, GoTo, SwarmState
-
-BoolArray = NDArray[np.bool_]
+from uas_coverage_env.planning.following import Following, SearchedOrder, Seen
+from uas_coverage_env.planning.following.searched_order import SearchedAgain
+from uas_coverage_env.planning.routing import Routes, RoutingProblem, SearchEffort
 
 _AGAIN_S = 10.0  # so often the order is searched anew: flights take as long as they take
-_WORTH_CHANGING_S = 2.0
 
 FAILURES = 4.0
 """So many steps late, or without a plan, and no flight goes as planned."""
@@ -62,63 +55,25 @@ class Failures:
         return self._steps > FAILURES
 
 
-class Steering:
-    """Sends each UAS along its route by the world's guidance.
+def along_order(
+    fleet: Fleet, order: Routes, moves: int, total_weight: float, seed: int
+) -> Following:
+    """Each UAS along its route by the world's guidance.
 
     Args:
         fleet: The mission.
-        brief: The same as the planner knows it.
         order: From which to go on.
         moves: Of each later search.
         total_weight: As in the search of the order.
         seed: Of later searches.
     """
 
-    def __init__(
-        self,
-        fleet: Fleet,
-        brief: MissionBrief,
-        order: Routes,
-        moves: int,
-        total_weight: float,
-        seed: int,
-    ) -> None:
-        self._fleet, self._order, self._seed = fleet, order, seed
-        self._effort = SearchEffort(moves, hottest_s=1.5, total_weight=total_weight)
-        self._again = max(round(_AGAIN_S / brief.dt_s), 1)
-        self._guided = GuidedFlight(brief)
-        self._recall, self._called = Recall(len(brief.uas)), np.zeros(len(brief.uas), np.bool_)
-        self._worked = np.zeros(len(brief.uas), np.bool_)
+    def problem(seen: Seen, visited: NDArray[np.bool_]) -> RoutingProblem:
+        any_time = np.zeros(len(visited), np.int64)
+        moment = Moment(seen.swarm.x, seen.works, visited, any_time, seen.swarm.time_s)
+        return fleet.problem(moment)
 
-    def commands(self, swarm: SwarmState, world: WorldView) -> Mapping[str, Command]:
-        """A command for each UAS that flies.
-
-        Args:
-            swarm: What is seen, of UAS that take commands.
-            world: The same, updated.
-        """
-        blocked = world.blocked()
-        wanted = self._guided.wanted(swarm.uncovered)
-        free = wanted & ~blocked
-        target = free if free.any() else wanted
-        if swarm.uncovered.any():
-            self._called = self._recall.update(swarm, world)
-        works = np.isin(swarm.names, swarm.active) & ~swarm.returning & ~self._called
-        self._search(swarm, works, target)
-        flown_to = {
-            swarm.names[u]: int(route[0])
-            for u, route in enumerate(self._order.routes)
-            if works[u] and len(route)
-        }
-        home: dict[str, Command] = {name: GoTo(None) for name in swarm.active}
-        return home | self._guided.commands(swarm, flown_to, blocked)
-
-    def _search(self, swarm: SwarmState, works: BoolArray, wanted: BoolArray) -> None:
-        moment = Moment(swarm.x, works, wanted, np.zeros(len(wanted), np.int64), swarm.time_s)
-        problem = self._fleet.problem(moment)
-        kept = improve_routes(problem, self._order, SearchEffort(0), 0)
-        if swarm.step % self._again == 0 or not np.array_equal(works, self._worked):
-            better = improve_routes(problem, kept, self._effort, self._seed + swarm.step)
-            if better.cost_s < kept.cost_s - _WORTH_CHANGING_S:
-                kept = better
-        self._order, self._worked = kept, works
+    effort = SearchEffort(moves, hottest_s=1.5, total_weight=total_weight)
+    every = max(round(_AGAIN_S / fleet.brief.dt_s), 1)
+    again = SearchedAgain(effort, every, seed)
+    return Following(fleet.brief, SearchedOrder(problem, order, again))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,13 @@ from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.flight_model import reduced_state
 from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_baselines.trajectory.movers import Movers
+from uas_coverage_baselines.trajectory.plan_in_force import PlanInForce
 from uas_coverage_baselines.trajectory.program import FlightProgram, PlannedFlight
 from uas_coverage_baselines.trajectory.retiming import repair, retimed, shifted, worth
 from uas_coverage_baselines.trajectory.space import Body
+from uas_coverage_baselines.trajectory.steering import Failures
 from uas_coverage_baselines.trajectory.work import done
+from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -24,6 +27,79 @@ IntArray = NDArray[np.int64]
 _ALL = 10**6  # steps of a path
 _MOST_LATER = 4  # steps
 _REPAIRS = 3
+
+
+class Tracking:
+    """Keeps what is planned in line with where the UAS are, and counts where that fails.
+
+    Args:
+        fleet: The mission.
+
+    Attributes:
+        is_disturbed: Whether a UAS was elsewhere than planned without the safety filter's doing:
+            plans then leave part of the limits to tracking.
+    """
+
+    def __init__(self, fleet: Fleet) -> None:
+        self._fleet, self._failures = fleet, Failures()
+        self.is_disturbed = False
+
+    @property
+    def fails(self) -> bool:
+        """Whether no flight goes as planned."""
+        return self._failures.are_many
+
+    def flies_without_plan(self, uas: int, swarm: SwarmState) -> None:
+        """Count a step of a UAS that flies otherwise than planned."""
+        self._failures.add(float(self.is_disturbed and swarm.responds[uas]))
+
+    def follow(
+        self,
+        in_force: PlanInForce,
+        swarm: SwarmState,
+        movers: Movers,
+        as_planned: Collection[int],
+    ) -> None:
+        """Plan from where the UAS are, where that is not where they were planned to be.
+
+        Args:
+            in_force: What is flown; changed.
+            swarm: Where the UAS are.
+            movers: What moves.
+            as_planned: UAS that were sent along their plans in the step before.
+        """
+        self._failures.next_step()
+        filtered = swarm.filtered if len(swarm.filtered) else np.zeros(len(swarm.x), np.bool_)
+        for u, planned in list(in_force.planned.items()):
+            rest = planned.course.rest(swarm.step)
+            if rest.begins_at(swarm.x[u]):
+                continue
+            if u not in as_planned:  # nothing pushed it: it flew something else
+                del in_force.planned[u]
+                continue
+            off = rest.x[0, S.VX : S.VZ + 1] - swarm.x[u, S.VX : S.VZ + 1]
+            obeys = swarm.responds[u] and not filtered[u]  # else it flies something else
+            self._failures.see(float(obeys * np.linalg.norm(off)))
+            if not self.is_disturbed and not filtered[u]:
+                self.is_disturbed = True
+                self._fleet.leave_room()
+                for k in list(in_force.planned):
+                    self._refit(k, in_force, self._fleet.program, swarm, movers)
+                return
+            later = self._refit(u, in_force, self._fleet.tracking_program, swarm, movers)
+            self._failures.add(float(obeys * later))
+
+    def _refit(
+        self,
+        uas: int,
+        in_force: PlanInForce,
+        program_of: ProgramOf,
+        swarm: SwarmState,
+        movers: Movers,
+    ) -> int:
+        """Plan the same visits from where a UAS is; steps by which its flight ends later."""
+        new = tracked(self._fleet, uas, in_force.planned, swarm, movers, program_of)
+        return in_force.fly_instead(uas, new)
 
 
 ProgramOf = Callable[[int, Mapping[int, FloatArray], Sequence[Body]], FlightProgram]
