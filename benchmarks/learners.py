@@ -1,13 +1,11 @@
-"""What the shipped policies cost and how they fly: trains, scores and draws what is published.
+"""What the shipped policy `learned-velocity` costs and how it flies: trains, scores, draws.
 
-    python benchmarks/learners.py                # everything, an hour
-    python benchmarks/learners.py ppo --seeds 3  # one learner
+    python benchmarks/learners.py --seeds 3
     python benchmarks/learners.py --publish      # and ship the policy of seed 0
 
-Trains each learner with each seed (a finished training is not repeated, a killed one of
-`uas-coverage train` goes on), flies 100 unseen towns with and without the safety filter, beside
-nearest-waypoint on the same towns, and fills what stands between the marks: of agents/README.md for
-the shipped policies, of docs/learners.md for the others.
+`uas-coverage train learned-velocity` with each seed (a finished training is not repeated, a killed
+one goes on), then 100 unseen towns with and without the safety filter, beside nearest-waypoint on
+the same towns; fills what stands between the marks of agents/README.md.
 """
 
 from __future__ import annotations
@@ -19,18 +17,16 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from uas_coverage_agents.policy import Policy, load_policy
-from uas_coverage_agents.training import curve, velocity_learning
-from uas_coverage_agents.training.checkpoint import CurvePoint
-from uas_coverage_agents.training.config import load_config
+from uas_coverage_agents.training import curve
+from uas_coverage_agents.training.rounds import TrainingJob, policy_of, untrained
 from uas_coverage_agents.training.scenarios import VALIDATION, town
 from uas_coverage_agents.training.score import MEASURES, Validation, fly, interval
-from uas_coverage_agents.training.training_run import TrainingJob, TrainingRun
+from uas_coverage_agents.training.settings import settings_of
 
 from uas_coverage_env import Scenario
 from uas_coverage_env.leaderboard import PlannerSpec
@@ -38,9 +34,9 @@ from uas_coverage_env.runner.workers import Workers
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "agents" / "README.md"
-LEARNERS = ROOT / "docs" / "learners.md"
 PICTURES = ROOT / "docs" / "pictures"
-SHIPPED = ROOT / "agents" / "uas_coverage_agents" / "shipped"
+LEARNER, NAME = "learned-velocity", "route-velocity"
+SHIPPED = ROOT / "agents" / "uas_coverage_agents" / "shipped" / LEARNER
 COVERAGE, HOME, VIOLATIONS, ENERGY, STEPS, FILTERED, _ = range(len(MEASURES))
 MEASURED = (
     "covered, %", "all home, %", "violations per mission", "filter changed, % of commands",
@@ -48,97 +44,40 @@ MEASURED = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Study:
-    """What is trained and published.
-
-    Attributes:
-        config: Name of the configuration, and of its place on the page.
-        shipped: Name of the planner that flies the policy of seed 0; empty: none.
-        assisted: Whether filter and return mode fly along.
-        module: That trains, where it is not `uas-coverage train`.
-        alone: Whether it is also flown without filter and return mode.
-    """
-
-    config: str
-    shipped: str = ""
-    assisted: bool = True
-    module: str = ""
-    alone: bool = False
-
-    @property
-    def command(self) -> str:
-        """What trains it, without the seed."""
-        train = f"uas-coverage train {self.config}"
-        return f"python -m {self.module} OUT" if self.module else train
-
-    @property
-    def page(self) -> Path:
-        """Where it is published."""
-        return README if self.shipped else LEARNERS
-
-
-STUDIES = (
-    Study("maskable-ppo", "learned-waypoint"),
-    Study("route-velocity", "learned-velocity", module=velocity_learning.__name__, alone=True),
-    Study("ppo"),
-    Study("sac"),
-    Study("ppo-end-to-end", assisted=False),
-)
-
-
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the studies; the exit code."""
+    """Train, fly and publish; the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    names = [study.config for study in STUDIES]
-    parser.add_argument("studies", nargs="*", metavar="STUDY", help=f"of {', '.join(names)}")
     parser.add_argument("--seeds", type=int, default=3, help="how many; 3 are published")
     parser.add_argument("--missions", type=int, default=100, help="towns that are flown")
     parser.add_argument("--trainings", type=Path, default=Path("trainings"), help="where they lie")
-    parser.add_argument("--publish", action="store_true", help="ship the policies of seed 0")
+    parser.add_argument("--publish", action="store_true", help="ship the policy of seed 0")
     arguments = parser.parse_args(argv)
-    unknown = set(arguments.studies) - set(names)
-    if unknown:
-        parser.error(f"unknown study {min(unknown)}")
     if arguments.seeds < 1 or not 1 <= arguments.missions <= 100:
         parser.error("--seeds: 1 or more; --missions: 1 to 100")
     towns = [town(VALIDATION, number) for number in range(arguments.missions)]
-    reference = nearest_waypoint(towns)
-    for study in STUDIES:
-        if arguments.studies and study.config not in arguments.studies:
-            continue
-        directories = [trained(study, seed, arguments.trainings) for seed in range(arguments.seeds)]
-        text = report(study, directories, towns, reference)
-        sys.stdout.write(f"{text}\n")
-        put(study.config, text, study.page)
-        if arguments.publish and study.shipped:
-            shutil.copytree(directories[0] / "policy", SHIPPED / study.shipped, dirs_exist_ok=True)
+    directories = [trained(seed, arguments.trainings) for seed in range(arguments.seeds)]
+    text = report(directories, towns, flown_by("nearest-waypoint", towns))
+    sys.stdout.write(f"{text}\n")
+    put(NAME, text)
+    if arguments.publish:
+        shutil.copytree(directories[0] / "policy", SHIPPED, dirs_exist_ok=True)
     return 0
 
 
-def trained(study: Study, seed: int, folder: Path) -> Path:
+def trained(seed: int, folder: Path) -> Path:
     """Train, or find what was trained before."""
-    directory = folder / f"{study.config}-{seed}"
+    directory = folder / f"{LEARNER}-{seed}"
     if not (directory / "policy" / "policy.json").exists():
         script = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
-        command = ["-c", script, "train", study.config, "--out", str(directory)]
-        if study.module:
-            command = ["-m", study.module, str(directory)]
-        subprocess.run([sys.executable, *command, "--seed", str(seed)], check=True)
+        words = ["-c", script, "train", LEARNER, "--seed", str(seed), "--out", str(directory)]
+        subprocess.run([sys.executable, *words], check=True)
     return directory
 
 
-def untrained(study: Study) -> Policy:
-    """What a study begins with; where it is trained does not matter."""
-    if study.module:
-        return velocity_learning.VelocityTraining(seed=0).policy()
-    config = load_config(study.config, changes=["scenarios.pool=1", "num_envs=1"])
-    return TrainingRun.untrained(TrainingJob(study.config, config, seed=0)).policy()
-
-
-def nearest_waypoint(towns: Sequence[Scenario]) -> NDArray[np.float64]:
-    """(missions, measures) of the simplest planner."""
-    return flown_by("nearest-waypoint", towns)
+def untrained_policy() -> Policy:
+    """What a training begins with; where it is trained does not matter."""
+    job = TrainingJob(LEARNER, settings_of(LEARNER))
+    return policy_of(job, untrained(job), 0.0, 0.0)
 
 
 def flown_by(
@@ -150,47 +89,34 @@ def flown_by(
 
 
 def report(
-    study: Study,
-    directories: Sequence[Path],
-    towns: Sequence[Scenario],
-    reference: NDArray[np.float64],
+    directories: Sequence[Path], towns: Sequence[Scenario], reference: NDArray[np.float64]
 ) -> str:
-    """The section of a study, and its picture."""
+    """The section of the page, and its picture."""
     policies = [load_policy(directory / "policy") for directory in directories]
-    start, *results = [
-        fly(policy, towns, safety_filter=study.assisted, return_mode=study.assisted)
-        for policy in (untrained(study), *policies)
-    ]
-    folder = Path(os.path.relpath(PICTURES, study.page.parent)).as_posix()
+    folder = Path(os.path.relpath(PICTURES, README.parent)).as_posix()
     lines = [
-        f"`{study.command} --seed 0` and the other seeds, "
-        f"scored by `python benchmarks/learners.py {study.config} "
-        f"--seeds {len(directories)} --missions {len(towns)}`; {machine()}.",
+        f"`python benchmarks/learners.py --seeds {len(directories)} --missions {len(towns)}`; "
+        f"{machine()}.",
         "",
-        f"![Learning curves]({folder}/learning-{study.config}.png)",
+        f"![Learning curves]({folder}/learning-{NAME}.png)",
         "",
         table_head(),
         table_row("`nearest-waypoint`", None, reference, None),
-        table_row("before training", None, start, reference),
+        table_row("before training", None, fly(untrained_policy(), towns), reference),
     ]
-    for policy, result in zip(policies, results, strict=True):
+    for policy in policies:
         name = f"seed {policy.description.training.seed}"
-        if study.shipped and policy is policies[0]:
-            name += f" = `{study.shipped}`"
-        lines.append(table_row(name, policy, result, reference))
-    if study.assisted:
+        if policy is policies[0]:
+            name += f" = `{LEARNER}`"
+        lines.append(table_row(name, policy, fly(policy, towns), reference))
+    for words, return_mode in (("filter off", True), ("filter and return mode off", False)):
         for policy in policies:
-            name = f"seed {policy.description.training.seed}, filter off"
-            bare = fly(policy, towns, safety_filter=False, return_mode=True)
+            name = f"seed {policy.description.training.seed}, {words}"
+            bare = fly(policy, towns, safety_filter=False, return_mode=return_mode)
             lines.append(table_row(name, None, bare, None))
-    if study.alone:
-        for policy in policies:
-            name = f"seed {policy.description.training.seed}, filter and return mode off"
-            bare = fly(policy, towns, safety_filter=False, return_mode=False)
-            lines.append(table_row(name, None, bare, None))
-    runs = {f"seed {k}": curve_of(directory) for k, directory in enumerate(directories)}
+    runs = {f"seed {k}": curve.read(directory) for k, directory in enumerate(directories)}
     PICTURES.mkdir(parents=True, exist_ok=True)
-    curve.draw(runs).savefig(PICTURES / f"learning-{study.config}.png", dpi=110)
+    curve.draw(runs).savefig(PICTURES / f"learning-{NAME}.png", dpi=110)
     return "\n".join(lines)
 
 
@@ -248,11 +174,6 @@ def training_of(policy: Policy) -> str:
         f"{training.steps / 1e6:.2f} M steps, {training.process_s:.0f} s of one core "
         f"({training.wall_s:.0f} s)"
     )
-
-
-def curve_of(directory: Path) -> list[CurvePoint]:
-    """The learning curve of a training."""
-    return curve.read(directory)
 
 
 def machine() -> str:

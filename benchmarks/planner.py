@@ -236,7 +236,7 @@ def joint(
         problem = _reached(problem)
         cells, alone_s = [f"{step}"], 0.0
         for name in (None, *names):
-            effort = Effort(threads=1, joint=name)
+            effort = Effort(work=5.0, threads=1, joint=name)
             began = time.process_time()
             plan = decide(replace(problem), None, problem.dt_s, effort)
             took_s = time.process_time() - began
@@ -365,7 +365,7 @@ def _planned_anew(planner: object) -> int:
 
 def _limit_s(planner: object) -> float:
     """The planner's own time limit; planners without one are measured against the step of 1 s."""
-    return float(getattr(getattr(planner, "options", None), "time_limit_s", 1.0))
+    return float(getattr(getattr(planner, "options", None), "time_limit_s", None) or 1.0)
 
 
 def _options(given: list[str] | None) -> dict[str, str]:

@@ -4,9 +4,9 @@
     python benchmarks/reference_learners.py --out reference --share 0.1 # a tenth of the steps
     python benchmarks/reference_learners.py --out reference --publish   # and the table
 
-Learners are the files of `agents/uas_coverage_agents/reference/learners`, or a .toml of your own.
-Whatever is finished is not repeated: a kill costs the round of a training that is under way, and
-the mission that is flown. Needs the extra `learn`.
+Learners are those of `uas-coverage train`, or a .toml of your own. Whatever is finished is not
+repeated: a kill costs the rounds that are under way, and the missions that are flown. Needs the
+extra `learn`.
 """
 
 from __future__ import annotations
@@ -16,18 +16,21 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from uas_coverage_agents.reference.policy import ReferencePolicy
-from uas_coverage_agents.reference.settings import Reference, reference_named, reference_names
+from uas_coverage_agents.training.settings import FOLDER, LearnerSettings, settings_of
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.flying import flown
 from uas_coverage_env.runner.store import opened
+from uas_coverage_env.runner.workers import Workers
 from uas_coverage_env.tasks import LEVELS, Score
 from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
 
 PAGE = Path(__file__).parents[1] / "docs" / "level_scores.md"
 FIRST, LAST = "<!-- reference learners: {} -->\n", "<!-- end of reference learners: {} -->"
+REFERENCE = sorted(
+    path.stem for path in FOLDER.glob("*.toml") if not path.stem.startswith("learned-")
+)
 HEAD = (
     "learner", "steps", "processor time, s", "trainings", "score [95 %]", "covered, %",
     "lost or not home", "energy, %", "return", "missions",
@@ -39,7 +42,7 @@ class Result:
     """A learner on a level: all of its trainings."""
 
     name: str
-    reference: Reference
+    summary: str
     steps: int
     process_s: float
     trainings: int
@@ -50,10 +53,11 @@ def main() -> int:
     """Train, score, publish; the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--levels", default="easy", help=f"of {', '.join(LEVELS)}")
-    parser.add_argument("--learners", default=",".join(reference_names()))
+    parser.add_argument("--learners", default=",".join(REFERENCE))
     parser.add_argument("--seeds", type=int, default=1, help="trainings of each learner")
     parser.add_argument("--share", type=float, default=1.0, help="of the steps of their files")
     parser.add_argument("--missions", type=int, default=20, help="test missions of each training")
+    parser.add_argument("--jobs", type=int, default=1, help="trainings side by side")
     parser.add_argument("--out", type=Path, default=Path("reference"))
     parser.add_argument("--publish", action="store_true", help="write docs/level_scores.md")
     given = parser.parse_args()
@@ -61,14 +65,11 @@ def main() -> int:
         parser.error("--seeds: 1 or more; --share: above 0, at most 100; --missions: 1 to 50")
     levels, parts = given.levels.split(","), {}
     try:
-        learners = {Path(n).stem: reference_named(n) for n in given.learners.split(",")}
         for level in levels:
             if level not in LEVELS:
                 raise InputError(f"--levels {level}: is none of {', '.join(LEVELS)}")
-            results = [
-                result_of(name, shortened(each, given.share), level, given)
-                for name, each in learners.items()
-            ]
+            learners = {Path(n).stem: settings(n, level, given) for n in given.learners.split(",")}
+            results = [result_of(name, each, given) for name, each in learners.items()]
             run = command(given, level)
             parts[level] = f"\n`{LEVELS[level].id}`: `{run}`\n\n{table(results)}\n\n"
     except InputError as error:
@@ -81,6 +82,13 @@ def main() -> int:
     return 0
 
 
+def settings(name: str, level: str, given: argparse.Namespace) -> LearnerSettings:
+    """A learner on a level, with a part of its budget."""
+    found = settings_of(name, scenario=level)
+    steps = max(1, round(given.share * found.total_timesteps))
+    return found.model_copy(update={"total_timesteps": steps})
+
+
 def publish(level: str, text: str) -> None:
     """Write the table of a level into the page."""
     first, last = FIRST.format(level), LAST.format(level)
@@ -91,38 +99,40 @@ def publish(level: str, text: str) -> None:
     PAGE.write_text(before + first + text + last + after, encoding="utf-8")
 
 
-def shortened(reference: Reference, share: float) -> Reference:
-    """The same with a part of the budget."""
-    steps = max(1, round(share * reference.steps))
-    return reference.model_copy(update={"steps": steps})
-
-
-def result_of(name: str, reference: Reference, level: str, given: argparse.Namespace) -> Result:
+def result_of(name: str, learner: LearnerSettings, given: argparse.Namespace) -> Result:
     """Train and score what was not before."""
-    from uas_coverage_agents.reference.training import train_reference
+    from uas_coverage_agents.training.rounds import POLICY, TrainingJob, TrainingProgress, train
+    from uas_coverage_agents.training.score import Validation
 
-    steps, process_s, missions = 0, 0.0, []
-    for seed in range(given.seeds):
-        directory = given.out / level / f"{name}-{seed}"
+    level = learner.scenario
+    folder = given.out / level
+    jobs = {
+        folder / f"{name}-{seed}": TrainingJob(name, learner, seed) for seed in range(given.seeds)
+    }
 
-        def told(done: int, steps: int, seconds: float, at: Path = directory) -> None:
-            sys.stderr.write(f"{at}: round {done}, {steps} steps, {seconds:.0f} s\n")
+    def told(progress: TrainingProgress) -> None:
+        which = f"{level}, {name}-{progress.job.seed}"
+        sys.stderr.write(f"{which}: round {progress.rounds}, {progress.steps} steps\n")
 
-        trained = train_reference(reference, level, seed, directory, told)
-        steps, process_s = steps + trained.steps, process_s + trained.process_s
-        missions += score_of(trained.policy, level, given.missions, directory)
-    mean_steps = round(steps / given.seeds)
-    mean_s = process_s / given.seeds
-    return Result(name, reference, mean_steps, mean_s, given.seeds, scored(level, missions))
+    with Workers(given.jobs) as workers:
+        policies = train(jobs, Validation(workers), told)
+    trained = [policy.description.training for policy in policies.values()]
+    missions = [one for place in jobs for one in score_of(place / POLICY, level, given.missions)]
+    return Result(
+        name,
+        learner.summary,
+        round(sum(each.steps for each in trained) / len(trained)),
+        sum(each.process_s for each in trained) / len(trained),
+        len(trained),
+        scored(level, missions),
+    )
 
 
-def score_of(
-    policy: ReferencePolicy, level: str, missions: int, directory: Path
-) -> list[MissionScore]:
+def score_of(policy: Path, level: str, missions: int) -> list[MissionScore]:
     """The first test missions of a level; those that the folder holds are not flown again."""
     task = LEVELS[level]
-    spec = spec_of(policy, task)
-    with opened(directory / "flights", DESCRIPTION, Row) as store:
+    spec = spec_of(f"policy:{policy}", task)
+    with opened(policy.parent / "flights", DESCRIPTION, Row) as store:
         kept, found = {row.key: row for row in store.rows()}, []
         for seed, scenario in task.scenarios("test", missions).items():
             entry = entry_of(spec, task, seed, scenario)
@@ -146,7 +156,7 @@ def table(results: list[Result]) -> str:
         home = sum(mission.home for mission in flown.missions)
         lines.append(
             (
-                f"`{one.name}`: {one.reference.summary}",
+                f"`{one.name}`: {one.summary}",
                 f"{one.steps:,}".replace(",", " "),
                 f"{one.process_s:.0f}",
                 str(one.trainings),
@@ -166,7 +176,7 @@ def command(given: argparse.Namespace, level: str) -> str:
     parts = ["python benchmarks/reference_learners.py"]
     asked = {**vars(given), "levels": level}
     usual = {
-        "levels": "easy", "learners": ",".join(reference_names()), "seeds": 1, "share": 1.0,
+        "levels": "easy", "learners": ",".join(REFERENCE), "seeds": 1, "share": 1.0,
         "missions": 20,
     }  # fmt: skip
     parts += [f"--{name} {asked[name]}" for name in usual if asked[name] != usual[name]]

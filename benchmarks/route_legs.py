@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.route.policy_runner import RouteRunner
 from uas_coverage_agents.route.rehearsal import Rehearsal
-from uas_coverage_agents.training.route_labels import town_of
 
 from uas_coverage_env import MissionBrief, Scenario, load_planner, rollout
 from uas_coverage_env.leaderboard import seed_range
+from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.world import build_arena
 from uas_coverage_env.world.routes import CLEAR, route
 
@@ -91,7 +91,7 @@ def main() -> None:
     sums: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0])
     shares = []
     for seed in seed_range("--seeds", asked.seeds):
-        scenario = town_of(seed)
+        scenario = sample_scenario(seed)
         planner.reset(MissionBrief.of(scenario), 0)
         along.runner.routes = planner.mission_plan.order.routes
         flight = rollout(scenario, along)

@@ -29,7 +29,7 @@ PAGE_PX = (1280, 800)
 SCENARIOS = ("village", "gasche2025", "corridor", "open_field", "generated:3", "streets:2")
 PLANNERS = (
     *("nearest-waypoint", "lawnmower", "tour"),
-    *("trajectory", "learned-waypoint", "learned-velocity"),
+    *("trajectory", "learned-route", "learned-velocity"),
 )
 
 

@@ -33,6 +33,7 @@ from environment_tables import (
 )
 from families_picture import families_table
 from markdown_table import table
+from uas_coverage_agents.training.settings import Environment, LearnerSettings
 
 from uas_coverage_env.env import (
     CoverageBatch,
@@ -216,6 +217,20 @@ def of_operations(name: str) -> str:
     return table(*getattr(importlib.import_module("operations_tables"), name)())
 
 
+def learner_settings() -> str:
+    """The keys of a file of `uas-coverage train`."""
+    text = re.split(r"^Attributes:\n", inspect.getdoc(LearnerSettings) or "", flags=re.MULTILINE)[1]
+    meanings = dict(re.findall(r"^(\w+): (.*(?:\n +.*)*)", inspect.cleandoc(text), re.MULTILINE))
+    rows = []
+    for name, field in LearnerSettings.model_fields.items():
+        default = field.get_default(call_default_factory=True)
+        plain = isinstance(default, str | int)
+        shown = "required" if field.is_required() else f"`{json.dumps(default)}`" if plain else ""
+        rows.append((f"`{name}`", shown, " ".join(meanings[name].split())))
+    chosen = ", ".join(f"`{name}`" for name in Environment.model_fields)
+    return f"{table(('key', 'default', 'meaning'), rows)}\n\n`[environment]` may hold {chosen}."
+
+
 PARTS: dict[str, Callable[[], str]] = {
     "batch_arrays": batch_arrays,
     "environments": environments,
@@ -238,6 +253,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "planners": planners,
     "figures": flight_figures,
     "comparison_columns": comparison_columns,
+    "learner_settings": learner_settings,
     "not_on_a_gpu": lambda: table(
         ("does not run on a GPU", "instead"), [(row.what, row.instead) for row in REFUSED]
     ),

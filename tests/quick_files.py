@@ -5,12 +5,10 @@ QUICK = {
     "test_release.py": "",
     "test_workflows.py": "",
     "agents/test_observer.py": "",
-    "agents/test_stuck_detection.py": "",
     "agents/test_policy_directory.py": (
         "but test_a_policy_with_spoilt_bytes_is_refused_in_one_line_or_is_the_same"
     ),
     "agents/test_route_policy.py": "only test_the_networks_of_the_file_are_those_that_are_compiled",
-    "agents/test_waypoint_observation.py": "",
     "autopilot/test_guidance.py": "",
     "autopilot/test_return_mode.py": "",
     "autopilot/test_safety_filter.py": "",
@@ -102,7 +100,7 @@ QUICK = {
     "paper/test_battery_figure.py": "",
     "planning/test_around.py": "",
     "planning/test_following.py": "",
-    "planning/test_backup_supervisor.py": "",
+    "planning/test_backup_courses.py": "",
     "planning/test_reserves.py": "",
     "reproduction/test_comparison.py": "",
     "reproduction/test_told_events.py": "",

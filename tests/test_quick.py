@@ -59,7 +59,7 @@ def test_every_package_is_imported_by_a_quick_test():
         for package in packages
         if not any(name == package or name.startswith(f"{package}.") for name in imported)
     }
-    assert missing <= {"uas_coverage_agents.training", "uas_coverage_agents.reference"}
+    assert missing <= {"uas_coverage_agents.training"}
 
 
 def test_tests_of_a_folder_stay_together_but_for_long_ones_that_share_nothing():

@@ -21,7 +21,6 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
     "lawnmower": ({}, None),
     "tour": ({}, None),
     "trajectory": ({}, None),
-    "learned-waypoint": ({}, None),
     "learned-velocity": ({}, None),
     "learned-route": ({}, None),
     "milp-mpc": ({"threads": "1"}, 12),
@@ -33,7 +32,6 @@ PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
 _MISSIONS = {
     "tour": (3, 60),
     "trajectory": (2, 30),
-    "learned-waypoint": (1, 30),
     "learned-route": (1, 30),
     "milp-mpc": (2, 30),
 }

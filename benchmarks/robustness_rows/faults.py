@@ -14,7 +14,7 @@ from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.metrics import accomplished, home
 
 FIRST_SEED = 7000
-PLANNERS = ("nearest-waypoint", "tour", "trajectory", "learned-waypoint")
+PLANNERS = ("nearest-waypoint", "tour", "trajectory", "learned-velocity")
 
 Rng = np.random.Generator
 Made = tuple[dict[str, Any], dict[str, Any]]

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 from uas_coverage_agents.policy import load_policy
-from uas_coverage_agents.training.config import load_config
-from uas_coverage_agents.waypoint.planner import SHIPPED
+from uas_coverage_agents.training.settings import FOLDER, settings_of
+from uas_coverage_agents.velocity.planner import SHIPPED
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
 from uas_coverage_env import generate_scenario, rollout
@@ -155,11 +155,11 @@ def _policy(rng: Rng, folder: Path) -> str:
 
 
 def _config(rng: Rng, folder: Path) -> str:
-    configs = files("uas_coverage_agents").joinpath("configs")
-    whole = configs.joinpath(f"{_CONFIGS[int(rng.integers(len(_CONFIGS)))]}.toml")
+    every = sorted(FOLDER.glob("*.toml"))
+    whole = every[int(rng.integers(len(every)))]
     path = folder / "file.toml"
     path.write_bytes(damaged(rng, whole.read_bytes()))
-    return _reading(lambda path: load_config(str(path)), path)
+    return _reading(lambda path: settings_of(str(path)), path)
 
 
 def _directory(
@@ -178,7 +178,6 @@ def _directory(
     return _reading(read, whole)
 
 
-_CONFIGS = ("maskable-ppo", "ppo", "ppo-end-to-end", "sac")
 _CHECK = ("scenario", "check", "--picture", "{folder}/map.png")
 _SCENARIOS = ("village", "open_field", "corridor")
 KINDS: Mapping[str, Callable[[Rng, Path], str]] = {

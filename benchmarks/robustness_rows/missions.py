@@ -22,7 +22,6 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
     "lawnmower": {},
     "tour": {},
     "trajectory": {},
-    "learned-waypoint": {},
     "learned-velocity": {},
     "learned-route": {},
     "milp-mpc": _QUICKER,
@@ -33,7 +32,6 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
 _MISSIONS = {
     "tour": (6, 300, 30),
     "trajectory": (4, 300, 10),
-    "learned-waypoint": (1, 300, 10),
     "learned-route": (1, 300, 10),
     "milp-mpc": (1, 300, 1),
 }

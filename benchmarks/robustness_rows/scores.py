@@ -6,14 +6,13 @@ from collections import defaultdict
 from collections.abc import Mapping
 
 import uas_coverage_agents.velocity.planner as velocity
-import uas_coverage_agents.waypoint.planner as waypoint
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.training.scenarios import validation_scenarios
 from uas_coverage_agents.training.score import MEASURES, fly
 
 from robustness_rows.row import Finding, Result, Row, Trial, errors, markdown
 
-POLICIES = {"learned-waypoint": waypoint.SHIPPED, "learned-velocity": velocity.SHIPPED}
+POLICIES = {"learned-velocity": velocity.SHIPPED}
 _SHOWN = ("coverage", "all_home", "violations", "energy_Wh", "flight_steps")
 
 
@@ -34,7 +33,7 @@ def mission(name: str, number: int) -> Result:
 
 def trials(quick: bool) -> list[Trial]:
     """The first missions of each, or as many as were published."""
-    published = {"learned-waypoint": 40, "learned-velocity": 40}
+    published = {"learned-velocity": 40}
     return [
         Trial(f"{name} {number}", mission, (name, number))
         for name in POLICIES
@@ -75,6 +74,5 @@ ROW = Row(
     trials,
     finding,
     lambda quick: "the validation missions of the policies, in their order",
-    "The search in simulation that `learned-waypoint` adds to its network, and, where fewer "
-    "missions are flown than were published, a comparison of the means.",
+    "Where fewer missions are flown than were published, a comparison of the means.",
 )

@@ -1,3 +1,5 @@
+"""A checkpoint is whole or it is the one before, holds nothing that runs, and is no other's."""
+
 import json
 import os
 import pickle
@@ -5,88 +7,81 @@ import pickle
 import numpy as np
 import pytest
 from uas_coverage_agents.training.checkpoint import (
+    CHECKPOINT,
     Checkpoint,
     TrainingState,
-    newest_checkpoint,
-    write_checkpoint,
+    checkpoint_in,
 )
 
+from uas_coverage_env.files import plain_files
 from uas_coverage_env.files.strict_toml import InputError
 
+ORDER = {"settings": {"algorithm": "ppo", "rounds": 4}, "seed": 3}
 
-def checkpoint_in(directory, steps: int) -> Checkpoint:
-    state = TrainingState(steps=steps, updates=1, process_s=0.5, wall_s=1, done=False, curve=())
-    tensors = {
-        "weights": np.full((2, 3), steps, np.float32),
-        "a single number": np.array(float(steps)),
-        "counters": np.arange(steps),
+
+def written(directory, rounds: int = 1) -> Checkpoint:
+    state = TrainingState(order=ORDER, rounds=rounds, process_s=0.5, wall_s=1.0, curve=())
+    arrays = {
+        "weights": np.full((2, 3), rounds, np.float32),
+        "a single number": np.array(float(rounds)),
+        "turned": np.arange(6).reshape(2, 3).T,
         "flags": np.array([True, False]),
-        "generator": np.array([2**32 - 1], np.uint32),
     }
-    checkpoint = Checkpoint(state, tensors)
-    write_checkpoint(directory, checkpoint)
+    checkpoint = Checkpoint(state, arrays)
+    checkpoint.write(directory)
     return checkpoint
 
 
-def files(directory) -> list[str]:
-    return sorted(path.name for path in directory.iterdir())
-
-
 def test_what_was_put_aside_is_taken_up_again(tmp_path):
-    written = checkpoint_in(tmp_path / "checkpoints", 5)
-    read = newest_checkpoint(tmp_path / "checkpoints")
-    assert read.state.model_copy(update={"tensors_sha256": ""}) == written.state
-    assert set(read.tensors) == set(written.tensors)
-    for name, array in written.tensors.items():
-        assert np.array_equal(read.tensors[name], array)
-        assert read.tensors[name].dtype == array.dtype
-        assert read.tensors[name].shape == array.shape
-
-
-def test_the_last_two_are_kept(tmp_path):
-    for steps in range(1, 6):
-        (tmp_path / f".{steps:06}.safetensors.77").write_bytes(b"half written when it was killed")
-        checkpoint_in(tmp_path, steps)
-    assert files(tmp_path) == [
-        "000004.json",
-        "000004.safetensors",
-        "000005.json",
-        "000005.safetensors",
-    ]
-    assert newest_checkpoint(tmp_path).state.steps == 5
+    wrote = written(tmp_path / "run")
+    read = checkpoint_in(tmp_path / "run", ORDER)
+    assert read.state == wrote.state
+    assert set(read.arrays) == set(wrote.arrays)
+    for name, array in wrote.arrays.items():
+        assert np.array_equal(read.arrays[name], array)
+        assert read.arrays[name].dtype == array.dtype
+        assert read.arrays[name].shape == array.shape
 
 
 def test_where_nothing_was_put_aside_there_is_none(tmp_path):
-    assert newest_checkpoint(tmp_path / "nowhere") is None
-    (tmp_path / "000001.safetensors").write_bytes(b"torn before its description was written")
-    assert newest_checkpoint(tmp_path) is None
+    assert checkpoint_in(tmp_path / "nowhere", ORDER) is None
 
 
-@pytest.mark.parametrize("name", ["000002.json", "000002.safetensors"])
-@pytest.mark.parametrize("spoilt", ["torn", "empty", "other", "pickle", "deep", "gone"])
-def test_a_torn_checkpoint_gives_way_to_the_one_before(tmp_path, name, spoilt):
-    checkpoint_in(tmp_path, 1)
-    checkpoint_in(tmp_path, 2)
-    path = tmp_path / name
-    content = {
-        "torn": path.read_bytes()[:-3],
-        "empty": b"",
-        "other": b"[1, 2]",
-        "pickle": pickle.dumps(os.getcwd),
-        "deep": b"[" * 100_000,
-    }
-    if spoilt == "gone":
-        path.unlink()
-    else:
-        path.write_bytes(content[spoilt])
-    assert newest_checkpoint(tmp_path).state.steps == 1
-    checkpoint_in(tmp_path, 3)
-    assert newest_checkpoint(tmp_path).state.steps == 3
+def test_a_kill_while_it_is_written_leaves_the_one_before(tmp_path, monkeypatch):
+    written(tmp_path, 1)
+
+    def torn(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plain_files.os, "replace", torn)
+    with pytest.raises(KeyboardInterrupt):
+        written(tmp_path, 2)
+    assert checkpoint_in(tmp_path, ORDER).state.rounds == 1
 
 
-def test_where_no_checkpoint_is_whole_the_line_says_what_to_do(tmp_path):
-    checkpoint_in(tmp_path, 1)
-    data = json.loads((tmp_path / "000001.json").read_text())
-    (tmp_path / "000001.json").write_text(json.dumps(data | {"steps": "many"}))
-    with pytest.raises(InputError, match=r"000001\.json: steps: .*start anew with --overwrite"):
-        newest_checkpoint(tmp_path)
+@pytest.mark.parametrize("spoilt", ["torn", "empty", "other", "pickle", "deep", "no object"])
+def test_a_damaged_one_is_refused_in_a_line_that_says_what_to_do(tmp_path, spoilt):
+    written(tmp_path)
+    path = tmp_path / CHECKPOINT
+    whole = path.read_bytes()
+    about = json.dumps({"__metadata__": {"training": "[" * 99_999}}).encode()
+    path.write_bytes(
+        {
+            "torn": whole[:-3],
+            "empty": b"",
+            "other": b"[1, 2]",
+            "pickle": pickle.dumps(os.getcwd),
+            "deep": len(about).to_bytes(8, "little") + about,
+            "no object": whole.replace(b'"training":"{', b'"training":"[', 1),
+        }[spoilt]
+    )
+    with pytest.raises(InputError, match="begin anew with --overwrite") as caught:
+        checkpoint_in(tmp_path, ORDER)
+    assert "\n" not in str(caught.value)
+
+
+def test_that_of_another_training_is_refused_with_what_differs(tmp_path):
+    written(tmp_path)
+    other = {**ORDER, "settings": {"algorithm": "ppo", "rounds": 5}}
+    with pytest.raises(InputError, match="settings: rounds is 4 there, 5 asked for"):
+        checkpoint_in(tmp_path, other)

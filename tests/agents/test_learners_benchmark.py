@@ -1,3 +1,4 @@
+import shutil
 import sys
 from pathlib import Path
 
@@ -14,7 +15,6 @@ from uas_coverage_env import generate_scenario
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 import end_to_end
-import fleets
 import learners
 
 
@@ -37,34 +37,32 @@ def test_a_report_takes_the_place_of_the_former_one(readme):
     assert readme.read_text() == text
 
 
-def test_every_study_has_its_place_on_its_page():
-    for study in learners.STUDIES:
-        text = study.page.read_text(encoding="utf-8")
-        assert text.count(f"<!-- {study.config} -->") == 1
-        assert text.count(f"<!-- end of {study.config} -->") == 1
+def test_what_is_published_has_its_place_on_its_page():
+    text = learners.README.read_text(encoding="utf-8")
+    assert text.count(f"<!-- {learners.NAME} -->") == 1
+    assert text.count(f"<!-- end of {learners.NAME} -->") == 1
 
 
-def test_a_report_tells_what_was_flown_with_and_without_the_filter(readme, tmp_path):
-    directory = tmp_path / "ppo-0"
-    write(directory / "policy")
+def test_a_report_tells_what_was_flown_with_and_without_the_assistants(readme, tmp_path):
+    directory = tmp_path / "learned-velocity-0"
+    shutil.copytree(learners.SHIPPED, directory / "policy")
     point = CurvePoint(
         steps=0, process_s=0, wall_s=0, coverage=0, all_home=1, violations=0,
         energy_Wh=1, flight_steps=9,
     )  # fmt: skip
     later = point.model_copy(update={"steps": 100, "coverage": 0.5})
     curve.write([point, later], directory)
-    assert learners.curve_of(directory) == [point, later]
+    assert curve.read(directory) == [point, later]
     towns = [generate_scenario(900_600, n_uas=1, n_waypoints=2, n_obstacles=1)]
-    reference = learners.nearest_waypoint(towns)
+    reference = learners.flown_by("nearest-waypoint", towns)
     assert reference[0, MEASURES.index("coverage")] == 1.0
-    study = learners.Study("ppo", "learned-velocity", alone=True)
-    text = learners.report(study, [directory], towns, reference)
+    text = learners.report([directory], towns, reference)
     assert "`nearest-waypoint` | " in text
     assert "| before training | " in text
     assert "| seed 0 = `learned-velocity` |" in text
     assert "| seed 0, filter off |" in text
     assert "| seed 0, filter and return mode off |" in text
-    assert (tmp_path / "pictures" / "learning-ppo.png").exists()
+    assert (tmp_path / "pictures" / "learning-route-velocity.png").exists()
 
 
 def test_means_stand_with_their_intervals_and_differences_in_percent(tmp_path):
@@ -80,25 +78,6 @@ def test_means_stand_with_their_intervals_and_differences_in_percent(tmp_path):
     assert cells[6].startswith("18.00 [16.")
     assert cells[8].startswith("-10.0 [-2")
     assert cells[9] == "0.0"
-
-
-def test_fleets_of_any_size_have_their_row_and_their_place_in_the_readme():
-    text = learners.README.read_text(encoding="utf-8")
-    assert text.count(f"<!-- {fleets.NAME} -->") == 1
-    assert [len(town.uas) for town in fleets.towns_of(8, 2)] == [8, 8]
-    reference = np.tile([1.0, 1.0, 0.0, 20.0, 100.0, 0.0], (4, 1))
-    row = fleets.row(8, "learned-waypoint", reference * 0.5, reference)
-    cells = [cell.strip() for cell in row.strip("|").split("|")]
-    assert len(cells) == len(fleets.HEAD)
-    assert cells[:3] == ["8", "`learned-waypoint`", "50.00"]
-    assert cells[-2:] == ["-50.0", "-50.0"]
-
-
-def test_a_study_names_the_command_that_trains_it_and_where_it_begins():
-    routes = next(study for study in learners.STUDIES if study.config == "route-velocity")
-    assert routes.command == "python -m uas_coverage_agents.training.velocity_learning OUT"
-    assert learners.Study("ppo").command == "uas-coverage train ppo"
-    assert learners.untrained(routes).description.training.steps == 0
 
 
 def test_what_flies_alone_is_told_for_ever_more_obstacles():

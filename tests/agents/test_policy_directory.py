@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from safetensors.numpy import load, save
 from tiny_policies import describe, weights, write
 from uas_coverage_agents.policy import load_policy, save_policy
+from uas_coverage_agents.route.planner import SHIPPED as LEARNED_ROUTE
+from uas_coverage_agents.velocity.planner import SHIPPED as LEARNED_VELOCITY
 
 from uas_coverage_env.files.plain_files import write_atomically
 from uas_coverage_env.files.strict_toml import InputError
@@ -53,6 +55,13 @@ def test_what_was_saved_is_loaded_again(directory):
     for name, tensor in weights(expected).items():
         assert np.array_equal(policy.tensors[name], tensor)
         assert not policy.tensors[name].flags.writeable
+
+
+@pytest.mark.parametrize("shipped", [LEARNED_ROUTE, LEARNED_VELOCITY], ids=lambda p: p.name)
+def test_a_shipped_policy_is_whole_and_what_it_was_trained_by_is_told(shipped):
+    described = load_policy(shipped).description
+    assert described.interface in ("route", "route-velocity")
+    assert described.training.settings
 
 
 def test_the_network_computes_layer_after_layer(directory):
@@ -113,7 +122,7 @@ def test_a_file_that_cannot_be_written_in_full_leaves_the_old_one(tmp_path, monk
         ({"version": 2}, ["version", "1"]),
         ({"version": "1"}, ["version"]),
         ({"version": True}, ["version"]),
-        ({"interface": "rudder"}, ["interface", "velocity"]),
+        ({"interface": "rudder"}, ["interface", "route-velocity"]),
         ({"interface": None}, ["interface"]),
         ({"network": {"kind": "exec"}}, ["network"]),
         ({"network": []}, ["network"]),

@@ -1,14 +1,14 @@
 import json
+import shutil
+import sys
 
-import numpy as np
 import pytest
-from tiny_policies import describe, weights, write
-from uas_coverage_agents.policy import save_policy
-from uas_coverage_agents.policy.planner import PolicyPlanner
+from tiny_policies import describe, write
+from tiny_trainings import tiny
+from uas_coverage_agents.training.rounds import TrainingJob, train
 
 from uas_coverage_env import InputError, generate_scenario, load_planner, rollout
 from uas_coverage_env.cli import main
-from uas_coverage_env.env import CoverageParallelEnv
 from uas_coverage_env.flight import describe_planners, registry
 
 
@@ -17,57 +17,42 @@ def scenario():
     return generate_scenario(900_501, n_uas=2, n_waypoints=5, n_obstacles=2)
 
 
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("trained")
+    settings = tiny("ippo", "environment.action=velocity", "rounds=1", scenario="village")
+    train({folder: TrainingJob("ippo", settings, 0, missions=1)})
+    return folder / "policy"
+
+
 @pytest.fixture
-def directory(tmp_path):
-    write(tmp_path / "policy")
-    return tmp_path / "policy"
+def directory(trained, tmp_path):
+    return shutil.copytree(trained, tmp_path / "policy")
 
 
 def test_a_policy_directory_is_a_planner(directory, scenario):
     flight = rollout(scenario, load_planner(f"policy:{directory}"), max_steps=5)
     assert flight.planner == f"policy:{directory}"
-    assert flight.planner_options == {"filter": True, "return_mode": True}
+    assert flight.planner_options == {"filter": True, "return_mode": True, "trust": False}
     assert (flight.safety_filter, flight.return_mode) == (True, True)
     bare = load_planner(f"policy:{directory}", {"filter": "false", "return_mode": "false"})
     flight = rollout(scenario, bare, max_steps=5)
     assert (flight.safety_filter, flight.return_mode) == (False, False)
 
 
-def test_a_policy_flies_as_its_actions_do_in_the_environment(directory, scenario):
-    planner = load_planner(f"policy:{directory}")
-    assert isinstance(planner, PolicyPlanner)
-    flight = rollout(scenario, planner, max_steps=40)
-    env = CoverageParallelEnv(scenario, return_mode=True, safety_filter=True)
-    views, _ = env.reset()
-    positions_m = [env.swarm_state().x[:, :3]]
-    for _ in range(40):
-        outputs = planner.policy.forward(np.stack([views[agent] for agent in env.agents]))
-        actions = np.clip(outputs, -1, 1).astype(np.float64)
-        views, *_ = env.step(dict(zip(env.agents, actions, strict=True)))
-        positions_m.append(env.swarm_state().x[:, :3])
-    assert np.array_equal(flight.x[:, :, :3], positions_m)
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"interface": "waypoint"}, "cannot be flown"),
-        ({"outputs": 4}, "network.outputs is 4, not 3"),
-        ({"layout": "somebody's own"}, "observation is not that of this version"),
-    ],
-)
-def test_a_policy_that_cannot_be_flown_is_refused(tmp_path, changes, words):
-    description = describe()
-    network, view = description.network, description.observation
-    if "outputs" in changes:
-        network = network.model_copy(update=changes)
-    if "layout" in changes:
-        view = view.model_copy(update=changes)
-    interface = changes.get("interface", "velocity")
-    description = describe(network=network, observation=view, interface=interface)
-    save_policy(tmp_path / "policy", description, weights(description))
-    with pytest.raises(InputError, match=words):
+def test_a_policy_whose_network_is_none_of_its_interface_is_refused(tmp_path):
+    write(tmp_path / "policy")
+    with pytest.raises(InputError, match="cannot be flown: its observation is not that"):
         load_planner(f"policy:{tmp_path / 'policy'}")
+
+
+def test_without_the_extra_a_policy_of_a_library_says_what_to_install(directory, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith("uas_coverage_agents.training.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.env_util", None)
+    with pytest.raises(InputError, match=r"pip install 'uas-coverage-env\[learn\]'"):
+        load_planner(f"policy:{directory}")
 
 
 def test_the_words_about_an_observation_may_change_and_its_numbers_may_not():
@@ -86,13 +71,15 @@ def test_the_words_about_an_observation_may_change_and_its_numbers_may_not():
 def test_planners_of_a_kind_are_named_with_their_argument(directory):
     assert "policy" not in registry.planner_names()
     described = {planner.name: planner for planner in describe_planners()}
-    assert [option.name for option in described["policy:DIR"].options] == ["filter", "return_mode"]
+    assert [option.name for option in described["policy:DIR"].options] == [
+        "filter", "return_mode", "trust",
+    ]  # fmt: skip
     for name in ("policy", "policy:", "polity:here"):
         with pytest.raises(InputError, match=r"planner .*policy:(\.\.\.|here)"):
             load_planner(name)
     with pytest.raises(InputError, match="':here' is no MODULE:"):
         load_planner(":here")
-    with pytest.raises(InputError, match="no option 'speed'; allowed: filter, return_mode"):
+    with pytest.raises(InputError, match="no option 'speed'; allowed: filter, return_mode, trust"):
         load_planner(f"policy:{directory}", {"speed": "1"})
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.policy.route_networks import RouteNetworks
+from uas_coverage_agents.route.fleet_routes import RouteProblems
 from uas_coverage_agents.route.landing import is_landed, towards_home
 from uas_coverage_agents.route.layers import layers_of, value_of
 from uas_coverage_agents.route.leg_flight import (
@@ -16,8 +17,7 @@ from uas_coverage_agents.route.leg_flight import (
 )
 from uas_coverage_agents.route.leg_plan import plan_along
 from uas_coverage_agents.route.leg_search import HORIZON, search_workspace
-from uas_coverage_agents.route.mission import MissionMaker
-from uas_coverage_agents.route.order import build, no_record, route_workspace
+from uas_coverage_agents.route.order import WEIGHT, build, no_record, route_workspace
 from uas_coverage_agents.route.places import detour_s, places_along
 from uas_coverage_agents.route.planner import SHIPPED, LearnedRoute, LearnedRouteOptions
 
@@ -28,6 +28,7 @@ from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.raised import raised
+from uas_coverage_env.planning.routing.search import arrays_of
 from uas_coverage_env.vehicle.layout import THETA, VX, VY, X
 from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.world import build_arena
@@ -47,13 +48,14 @@ def _built(scenario, wanted, late=None, works=None):
     home_score = layers_of(network.home, policy.tensors, "home.")
     late = np.zeros(len(brief.waypoints), np.bool_) if late is None else late
     works = np.ones(len(brief.uas), np.bool_) if works is None else works
-    mission = MissionMaker(brief).mission(first_sight(brief), works, late)
+    problems = RouteProblems(brief)
+    task = arrays_of(problems.seen(first_sight(brief), works, wanted), WEIGHT)
     routes = np.full((len(brief.uas), len(brief.waypoints)), -1)
     lengths = np.zeros(len(brief.uas), np.int64)
     rng = np.random.default_rng(0)
     cost_s = build(
-        mission, score, home_score, wanted, 0.0, rng, route_workspace(), no_record(), routes,
-        lengths,
+        task, problems.unit_s, score, home_score, np.array([wanted & ~late, wanted & late]), 0.0,
+        rng, route_workspace(), no_record(), routes, lengths,
     )  # fmt: skip
     return [routes[u, :n].tolist() for u, n in enumerate(lengths)], cost_s
 

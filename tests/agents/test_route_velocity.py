@@ -1,9 +1,11 @@
 """`learned-velocity`: routes as its plan, and one network that commands velocities along them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from tiny_trainings import untrained
 from uas_coverage_agents.policy import load_policy, save_policy
-from uas_coverage_agents.policy.description import Towns
 from uas_coverage_agents.policy.mlp import Mlp
 from uas_coverage_agents.policy.planner import PolicyPlanner
 from uas_coverage_agents.policy.route_networks import RouteNetworks
@@ -26,12 +28,15 @@ from uas_coverage_agents.route.velocity_layout import (
     observe_route,
     outputs_of,
 )
+from uas_coverage_agents.training import velocity_learning
+from uas_coverage_agents.training.learner import Told
+from uas_coverage_agents.training.missions import Missions
+from uas_coverage_agents.training.rounds import TrainingJob, train
+from uas_coverage_agents.training.settings import settings_of
 from uas_coverage_agents.training.velocity_learning import (
     DaggerRunner,
     DaggerSettings,
-    VelocityTraining,
-    mission_of,
-    train,
+    VelocityLearning,
 )
 from uas_coverage_agents.velocity.planner import SHIPPED
 
@@ -44,6 +49,8 @@ from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.vehicle.layout import VX, VY, X, Y, Z
 from uas_coverage_env.world import Velocity, build_arena
+
+NOTHING = np.zeros((0, N_VELOCITY)), np.zeros((0, 3))
 
 
 @pytest.fixture(scope="module")
@@ -167,10 +174,9 @@ def test_a_velocity_along_the_route_leaves_the_distance_that_is_asked_for(least_
 
 def test_where_it_is_too_late_to_brake_the_expert_turns_back():
     town = generate_scenario(seed=5, n_uas=1, n_waypoints=8, n_obstacles=0)
-    training = VelocityTraining(seed=0)
-    runner = DaggerRunner(
-        training.policy(), training.expert, 1.0, training.settings, np.random.default_rng(0)
-    )
+    training = untrained()
+    rng, settings = np.random.default_rng(0), DaggerSettings()
+    runner = DaggerRunner(training.learned(), training.expert, 1.0, settings, rng)
     brief = MissionBrief.of(town)
     runner.reset(brief, 0)
     sight, fence_m = first_sight(brief), town.fence.vertices_m
@@ -192,11 +198,10 @@ def test_outputs_are_what_they_command_and_back():
 
 
 def test_it_looks_straight_on_at_full_speed_before_training():
-    training = VelocityTraining(seed=0)
     row, frame = _in_the_open(np.eye(2))
-    policy = training.policy()
-    network = policy.description.network
-    outputs = policy.forward(np.concatenate([np.zeros(network.inputs - N_VELOCITY), row]))
+    learned = untrained().learned()
+    inputs = np.concatenate([np.zeros(learned.network.inputs - N_VELOCITY), row])
+    outputs = learned.network.forward(learned.tensors, inputs)
     values = commanded(outputs[None, -3:], frame[None], np.array([12.0]))[0]
     np.testing.assert_allclose(values[:2], 12.0 * frame[:2])
     assert values[2] == frame[4]
@@ -227,10 +232,10 @@ class ByLegs(LearnedRoute):
 
 
 def test_where_the_expert_leads_its_own_flight_is_flown_and_noted(town):
-    training = VelocityTraining(seed=0)
+    training = untrained()
     rng = np.random.default_rng(0)
     settings = DaggerSettings(samples=8, held=1, spare_m=0.0)
-    runner = DaggerRunner(training.policy(), training.expert, 1.0, settings, rng)
+    runner = DaggerRunner(training.learned(), training.expert, 1.0, settings, rng)
     led = rollout(town, runner, return_mode=False, safety_filter=True)
     own = rollout(town, ByLegs(), safety_filter=True)
     np.testing.assert_allclose(led.x, own.x, atol=1e-6)
@@ -239,27 +244,37 @@ def test_where_the_expert_leads_its_own_flight_is_flown_and_noted(town):
     assert np.abs(outputs[:, :2]).max() <= 1.0 + 1e-9
 
 
-def test_missions_of_a_training_are_flown_at_each_level_in_turn_and_in_still_air():
-    towns = Towns(first_seed=70, n_uas=(1, 2), n_waypoints=(8, 9), n_obstacles=(3, 4))
-    settings = DaggerSettings(towns=towns, levels=("light", "strong"))
-    winds = [mission_of(settings, number).wind for number in range(6)]
-    assert [wind is None for wind in winds] == [True, False, False] * 2
-    for light, strong in (winds[1:3], winds[4:6]):
-        assert light.mean_mps <= 4.0
-        assert strong.mean_mps >= 7.0
-    assert winds[1] != winds[4]
+def test_each_round_and_each_training_flies_missions_of_its_own(monkeypatch):
+    flown: list[int] = []
+    monkeypatch.setattr(Missions, "mission", lambda self, number: flown.append(number))
+    monkeypatch.setattr(VelocityLearning, "_fit", lambda *_, **__: None)
+    monkeypatch.setattr(velocity_learning, "rollout", lambda *_, **__: None)
+    monkeypatch.setattr(velocity_learning, "unless_stopped", lambda _: None)
+    monkeypatch.setattr(
+        velocity_learning, "DaggerRunner", lambda *_: SimpleNamespace(labels=[NOTHING])
+    )
+    for seed in (0, 1):
+        for number in range(2):
+            learner = untrained("rounds=2", "learning.missions_per_round=3", seed=1000 * seed)
+            learner.learn(number, Told())
+    assert flown == list(range(12))
 
 
 def test_a_training_leaves_a_policy_that_flies_and_the_same_seed_the_same(town, tmp_path):
-    towns = Towns(first_seed=1_000_000, n_uas=(1, 1), n_waypoints=(4, 4), n_obstacles=(0, 1))
-    small = DaggerSettings(towns=towns, rounds=2, towns_per_round=1, epochs=1, last_epochs=2)
+    small = [
+        *("rounds=2", "learning.missions_per_round=1", "learning.epochs=1"),
+        *("learning.last_epochs=2", "size.n_uas=[1, 1]", "size.n_waypoints=[4, 4]"),
+        "size.n_obstacles=[0, 1]",
+    ]
+    settings = settings_of("learned-velocity", changes=small)
     weights = []
     for name in ("first", "again"):
-        train(VelocityTraining(3, small), tmp_path / name, missions=2)
-        policy = load_policy(tmp_path / name / "policy")
+        (policy,) = train({tmp_path / name: TrainingJob(name, settings, 3, 1)}).values()
         weights.append(policy.description.weights_sha256)
-        assert policy.description.score.missions == 2
+        assert policy.description.interface == "route-velocity"
+        assert policy.description.score.missions == 1
         assert policy.description.training.steps > 20
+        assert policy.description.scenarios.towns.n_uas == (1, 1)
         assert (tmp_path / name / "learning_curve.csv").read_text().count("\n") == 4
     assert weights[0] == weights[1]
     flight = rollout(town, PolicyPlanner(None, tmp_path / "first" / "policy"), max_steps=5)

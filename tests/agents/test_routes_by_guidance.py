@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from tiny_trainings import untrained
 from uas_coverage_agents.route import policy_runner
 from uas_coverage_agents.route.velocity_runner import LEARNED_UP_TO_MPS
 from uas_coverage_agents.training.velocity_learning import (
     DaggerRunner,
     DaggerSettings,
-    VelocityTraining,
 )
 
 from uas_coverage_env import generate_scenario, rollout
@@ -84,13 +84,8 @@ def test_a_network_flies_to_large_spheres_and_guidance_to_small_ones(town):
 
 
 def test_what_is_to_be_learned_is_flown_in_any_wind(town):
-    training = VelocityTraining(seed=0)
-    runner = DaggerRunner(
-        training.policy(),
-        training.expert,
-        1.0,
-        DaggerSettings(samples=2),
-        np.random.default_rng(0),
-    )
+    training, rng = untrained(), np.random.default_rng(0)
+    settings = DaggerSettings(samples=2)
+    runner = DaggerRunner(training.learned(), training.expert, 1.0, settings, rng)
     rollout(with_disturbances(town, "strong", 1), runner, return_mode=False, max_steps=10)
     assert len(runner.labels) >= 10

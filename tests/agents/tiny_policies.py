@@ -2,16 +2,18 @@
 
 import numpy as np
 from uas_coverage_agents.policy import PolicyDescription, save_policy
-from uas_coverage_agents.policy.description import ScenarioFamily, Training
+from uas_coverage_agents.policy.description import Observation, ScenarioFamily, Training
 from uas_coverage_agents.policy.mlp import Mlp
-from uas_coverage_agents.velocity.policy_runner import observation
+
+from uas_coverage_env.env.observation import OBSERVATION
+from uas_coverage_env.env.observation.scales import SCALES
 
 
 def describe(**changes) -> PolicyDescription:
-    """A velocity policy with one layer of eight."""
-    view = observation()
+    """A policy with one layer of eight."""
+    view = Observation.of("uas_coverage_v0", OBSERVATION, SCALES)
     fields = {
-        "interface": "velocity",
+        "interface": "route-velocity",
         "network": Mlp(inputs=view.size, hidden=(8,), outputs=3, activation="tanh"),
         "observation": view,
         "scenarios": ScenarioFamily(name="village"),

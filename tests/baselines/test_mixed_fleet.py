@@ -1,7 +1,7 @@
 """A mapper and a searcher with other sensors fly one mission."""
 
 import pytest
-from uas_coverage_agents.waypoint.planner import LearnedWaypoint
+from uas_coverage_agents.velocity.planner import LearnedVelocity
 from uas_coverage_baselines.lawnmower import Lawnmower
 from uas_coverage_baselines.milp_mpc.paper_planner import MilpMpcPaper
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc
@@ -28,7 +28,7 @@ def test_each_flies_what_it_can_cover_and_all_is_covered(name):
     assert flight.breaches == 0
 
 
-@pytest.mark.parametrize("planner", [MilpMpc, MilpMpcPaper, LearnedWaypoint])
+@pytest.mark.parametrize("planner", [MilpMpc, MilpMpcPaper, LearnedVelocity])
 def test_planners_that_do_not_know_of_sensors_refuse_the_mission(planner):
     with pytest.raises(InputError, match=r"refuses scenario 'mixed_fleet'.*asks for a sensor"):
         rollout(load_scenario("mixed_fleet"), planner(), max_steps=1)

@@ -22,7 +22,7 @@ SHORTER = {
     "run": ["--steps", "1"],
     "reproduce": ["--steps", "1", "--seeds", "0:1", *ALONE],
     "score": ["--missions", "1", "--planners", "nearest-waypoint"],
-    "train": ["--minutes", "0.01", "--missions", "1", "--set", "scenarios.pool=2"],
+    "train": ["--steps", "64", "--missions", "1", "--set", "rounds=1", "--baselines", "none"],
 }
 COMPARED = {"--scenarios": "open_field", "--planners": "nearest-waypoint", "--seeds": "0:1"}
 VARIED = {"--planners": "lawnmower", "--vary": "filter=true"}

@@ -28,8 +28,8 @@ SHORTER = {
         "map_figure(flight, step=60)": "map_figure(flight, step=10)",
     },
     "4_learn_and_compare": {
-        "steps=60_000": "steps=8_000",
-        "scenarios.pool=40": "scenarios.pool=8",
+        "total_timesteps=120_000": "total_timesteps=8_000",
+        '"agent=each",': '"agent=each", "rounds=2",',
         "missions=4": "missions=2",
         "range(2000, 2006)": "range(2000, 2002)",
     },

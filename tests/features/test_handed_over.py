@@ -5,7 +5,6 @@ import pytest
 from eventful import WAYPOINTS, event, field
 from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.velocity.planner import LearnedVelocity
-from uas_coverage_agents.waypoint.planner import LearnedWaypoint
 from uas_coverage_baselines.milp_mpc import MilpMpc
 from uas_coverage_baselines.nearest_waypoint import NearestWaypoint
 from uas_coverage_baselines.tour import Tour
@@ -25,7 +24,6 @@ PLANNERS = {
     "nearest-waypoint": NearestWaypoint,
     "tour": lambda: Tour(Tour.Options(moves=20_000, changes=60)),
     "trajectory": lambda: Trajectory(Trajectory.Options(orders=1, moves=20_000, programs=20)),
-    "learned-waypoint": lambda: LearnedWaypoint(LearnedWaypoint.Options(simulations=4)),
     "learned-route": lambda: LearnedRoute(LearnedRoute.Options(samples=4)),
     "learned-velocity": LearnedVelocity,
     "milp-mpc": milp("none"),

@@ -8,7 +8,6 @@ from eventful import event, field
 from small_worlds import mover, waypoint
 from uas_coverage_agents.route.planner import LearnedRoute
 from uas_coverage_agents.velocity.planner import LearnedVelocity
-from uas_coverage_agents.waypoint.planner import LearnedWaypoint
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory import Trajectory
 
@@ -32,7 +31,6 @@ LOST_2 = event("uas_lost", LOST_AT_S, uas="uas_2")
 PLANNERS = {
     "tour": lambda: Tour(Tour.Options(moves=20_000, changes=60)),
     "trajectory": lambda: Trajectory(Trajectory.Options(orders=1, moves=20_000, programs=20)),
-    "learned-waypoint": lambda: LearnedWaypoint(LearnedWaypoint.Options(simulations=4)),
     "learned-route": lambda: LearnedRoute(LearnedRoute.Options(samples=4)),
     "learned-velocity": LearnedVelocity,
 }

@@ -276,7 +276,7 @@ def test_every_field_of_a_decision_survives_its_file(tmp_path):
         outer_limits=True,
         order=3,
         corners_of_all=False,
-        tube_m=np.array([[0.1, 0.2, 0.4, 0.5], [0.1, 0.3, 0.4, 0.6]]),
+        data={"Radio": {"range_m": np.array([70.0, 90.0]), "station": np.array(2)}},
         prune=False,
     )
     for one in fields(problem):

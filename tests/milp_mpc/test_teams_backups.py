@@ -7,6 +7,7 @@ import pytest
 from toy_problems import S500, box, flown, moving, state, toy
 from uas_coverage_baselines.milp_mpc.fallback.backup import (
     backup_trajectory,
+    course_of,
     prolonged,
     still_holds,
 )
@@ -15,7 +16,9 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import short_s
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
-from uas_coverage_env.vehicle.layout import DOD, PHI, THETA, VX, VZ
+from uas_coverage_env.planning.backup import braked
+from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.layout import DOD, PHI, THETA, VX, VZ, WX
 from uas_coverage_env.vehicle.range import dod_per_s
 
 HORIZON = 8
@@ -142,9 +145,9 @@ def test_each_of_a_team_stops_where_it_can_still_come_home(row):
     assert 0 < n < HORIZON
     # at the end of all of it: what hovers while the other still flies takes charge
     assert short_s(scarce, row, out.x[row, -1], allowance=False) <= 0.0
-    longer = {"x": plan.x[:, : n + 2], "u": plan.u[:, : n + 1], "covers": plan.covers[:, : n + 1]}
-    more = backup_trajectory(scarce, dataclasses.replace(plan, **longer), 1.0)
-    assert followed(plan, more, row) <= n
+    record = compile_vehicle(S500, 1.0)[()]
+    farther = braked(record, course_of(plan, "ab"[row]), n + 1, BRAKING)
+    assert short_s(scarce, row, farther.x[-1], allowance=False) > 0.0
 
 
 def test_one_that_is_late_whatever_it_does_holds_up_no_other():
@@ -152,6 +155,49 @@ def test_one_that_is_late_whatever_it_does_holds_up_no_other():
     out = backup_trajectory(late, plan, 1.0)
     assert out is not None
     assert [followed(plan, out, k) for k in range(2)] == [HORIZON] * 2
+
+
+@pytest.mark.parametrize(("spare_s", "is_late"), [(0.5, False), (-0.5, True)])
+def test_a_uas_is_late_from_the_moment_on_at_which_it_would_have_had_to_turn_back(spare_s, is_late):
+    problem, plan = far_from_home(spare_s)
+    out = backup_trajectory(problem, plan, 1.0)
+    assert (out is not None and followed(plan, out, 1) == HORIZON) == is_late
+
+
+def test_a_wall_before_one_uas_does_not_shorten_what_another_follows():
+    starts = [state((60.0, 60.0 + 60.0 * k, -10.0), (6.0, 0.0, 0.0)) for k in range(2)]
+    plan = plan_of(*[flown(S500, x0, NORTH) for x0 in starts])
+    wall_m = float(plan.x[1, -1, 0]) + 3.0
+    wall = box((wall_m, 90.0, -49.0), (wall_m + 20.0, 150.0, 0.0))
+    problem = toy(*starts, horizon=HORIZON, obstacles=[wall])
+    assert first_trouble(problem, plan) is None
+    out = backup_trajectory(problem, plan, 1.0)
+    assert followed(plan, out, 0) == HORIZON
+    assert 0 < followed(plan, out, 1) < HORIZON
+
+
+@pytest.mark.parametrize(("share", "followed_to"), [(0.9, HORIZON - 1), (0.2, HORIZON)])
+def test_a_plan_is_left_before_a_manoeuvre_out_of_which_braking_would_lean_too_far(
+    share, followed_to
+):
+    limits, plan = S500.limits, plan_of(flown(S500, state((60.0, 60.0, -10.0)), NORTH))
+    plan.x[0, -1, PHI] = share * limits.tilt_max_rad  # and leaning farther
+    plan.x[0, -1, WX] = share * limits.rate_max_radps
+    problem = toy(plan.x[0, 0], horizon=HORIZON)
+    braking = braked(compile_vehicle(S500, 1.0)[()], course_of(plan, "a"), HORIZON, BRAKING).x
+    leans = np.hypot(braking[HORIZON + 1 :, PHI], braking[HORIZON + 1 :, THETA]).max()
+    assert (leans > 1.02 * limits.tilt_max_rad) == (followed_to < HORIZON)
+    assert followed(plan, backup_trajectory(problem, plan, 1.0)) == followed_to
+
+
+def test_what_a_plan_itself_does_is_not_asked_of_braking():
+    limits, plan = S500.limits, plan_of(flown(S500, state((60.0, 60.0, -10.0)), NORTH))
+    plan.x[0, -1, PHI], plan.x[0, -1, WX] = 1.1 * limits.tilt_max_rad, -0.5 * limits.rate_max_radps
+    problem = toy(plan.x[0, 0], horizon=HORIZON)
+    braking = braked(compile_vehicle(S500, 1.0)[()], course_of(plan, "a"), HORIZON, BRAKING).x
+    leans = np.hypot(braking[HORIZON + 1 :, PHI], braking[HORIZON + 1 :, THETA])
+    assert leans.max() < limits.tilt_max_rad
+    assert followed(plan, backup_trajectory(problem, plan, 1.0)) == HORIZON
 
 
 def test_a_team_waits_for_the_end_of_the_longest_and_keeps_what_it_covers_until_it_brakes():
@@ -163,6 +209,23 @@ def test_a_team_waits_for_the_end_of_the_longest_and_keeps_what_it_covers_until_
     assert n[1] < n[0] == HORIZON
     assert out.u.shape[1] == HORIZON + BRAKING
     assert np.argwhere(out.covers).tolist() == [[0, HORIZON - 1, 2], [1, 1, 0]]
+
+
+def test_what_moves_is_predicted_for_as_long_as_the_longest_backup_takes():
+    plan = plan_of(flown(S500, state((60.0, 60.0, -10.0), (6.0, 0.0, 0.0)), NORTH))
+    late_m = plan.x[0, -1, :3] + (9.0, 0.0, 0.0)  # where the first will hover
+    path_m = late_m + np.outer(np.arange(HORIZON + 1) - 20, (0.0, 6.0, 0.0))
+    problem = toy(
+        *plan.x[:, 0],
+        horizon=HORIZON,
+        moving_obstacles=[moving(path_m, 2.0, 2.0)],
+        moving_clearance_m=3.0,
+    )
+    assert first_trouble(problem, plan) is None
+    out = backup_trajectory(problem, plan, 1.0)
+    assert followed(plan, out, 0) < HORIZON
+    level_m = out.x[0, 20:22, :2] - late_m[:2]
+    assert np.hypot(*level_m.T).min() > 5.0
 
 
 # what is left still holds

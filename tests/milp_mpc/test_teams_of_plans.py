@@ -38,7 +38,7 @@ def plan_of(problem, uas, command, covered, blocks=OCP):
 
 def team_of(problem, plans, blocks=OCP):
     """What becomes of plans of which each UAS has one."""
-    search = TeamSearch(problem, Effort(joint=None), time.perf_counter(), blocks)
+    search = TeamSearch(problem, EFFORT, time.perf_counter(), blocks)
     for uas, plan in enumerate(plans):
         search.collect(uas, [plan])
     search.combine([[], []])

@@ -14,7 +14,6 @@ PLANNERS = {
     "tour": {"moves": 20_000, "changes": 50},
     "milp-mpc": LITTLE_MILP,
     "learned-route": {"samples": 4, "changes": 1000, "rehearsed": 1},
-    "learned-waypoint": {},
     "learned-velocity": {},
 }
 

@@ -14,6 +14,7 @@ from robustness_rows import (
     judge,
     kills,
     missions,
+    mutants,
 )
 from robustness_rows.page import page
 from robustness_rows.row import Finding, Row, Trial
@@ -216,3 +217,32 @@ def test_damaged_files_differ_from_the_whole_one_and_repeat_with_their_seed():
         result = fuzz.try_files(kind, 1)
         assert sum(result["tally"].values()) == fuzz.FILES_OF_A_TRIAL
         assert not result["failures"]
+
+
+def test_the_files_that_are_mutated_and_the_tests_named_for_them_exist():
+    for each in mutants.TABLE["files"]:
+        assert (mutants.ROOT / each["path"]).is_file(), each["path"]
+        assert each["quick"], each["path"]
+        for test in (*each["quick"], *each["compiled"]):
+            assert (mutants.ROOT / test.partition("::")[0]).is_file(), test
+    of_files = [each["path"] for each in mutants.TABLE["files"]]
+    assert len(set(of_files)) == len(of_files)
+    for each in mutants.TABLE["equivalent"]:
+        assert each["mutant"].partition(":")[0] in of_files
+        assert each["why"]
+
+
+def test_a_mutant_is_caught_or_the_same_or_counts_against_the_row():
+    same = mutants.TABLE["equivalent"][0]["mutant"]
+    path = same.partition(":")[0]
+    results = {
+        "as it is": {"path": path, "mutant": None},
+        "a": {"path": path, "mutant": "a", "caught": "quick"},
+        "b": {"path": path, "mutant": "b", "caught": None},
+        "c": {"path": path, "mutant": same, "caught": None},
+        "d": {"error": "RuntimeError: its tests fail without a mutant"},
+    }
+    found = mutants.finding(results)
+    assert (found.trials, found.failures) == (4, 2)
+    assert f"| `{path}` | 3 | 1 | 1 | 1 | 50% |" in found.table
+    assert "- not caught: b" in found.table

@@ -126,6 +126,14 @@ def test_a_course_is_followed_as_long_as_its_hover_is_clear_and_has_charge(limit
     assert np.linalg.norm(hovers[:, S.VX : S.VZ + 1], axis=1).max() < 0.1
 
 
+@pytest.mark.parametrize("limit", ["wall_m", "crossed_m"])
+def test_one_step_is_followed_where_no_more_is_possible(limit):
+    supervisor, course = supervisor_of(), north()
+    world = World(**({"crossed_m": 59.0} | {limit: by_hand(course, 1).x[:, 0].max() + 0.1}))
+    assert renewed(supervisor, world, {0: course}) == {0}
+    assert same(supervisor.backups[0], by_hand(course, 1))
+
+
 @pytest.mark.parametrize("limit", ["wall_m", "home_m"])
 def test_a_course_whose_first_step_leads_too_far_is_not_followed(limit):
     supervisor, course = supervisor_of(), north()
@@ -170,6 +178,16 @@ def test_a_file_of_uas_of_which_each_takes_the_next_one_s_place_moves_at_once():
     supervisor = supervisor_of(5)
     supervisor.backups = {u: hover(place) for u, place in enumerate([*places, (60.0, 0.0, -20.0)])}
     assert renewed(supervisor, World(), wanted, x4=supervisor.backups[4].x[0]) == set()
+
+
+def test_one_by_one_new_courses_are_tried_in_two_rounds():
+    # in turn, each takes the next one's place, and two others, far off, are in their way
+    places = [(15.0 * k, 0.0, -20.0) for k in range(4)] + [(0.0, 90.0, -20.0), (15.0, 90.0, -20.0)]
+    supervisor = supervisor_of(6)
+    supervisor.backups = {u: hover(place) for u, place in enumerate(places)}
+    wanted = {u: straight(places[u], (5.0, 0.0, 0.0), 3) for u in range(5)}
+    still = supervisor.backups[5].x[0]
+    assert renewed(supervisor, World(), wanted, x5=still) == {3, 2}
 
 
 @pytest.mark.parametrize("pair", [(0, 1), (1, 2), (0, 2)])
@@ -266,7 +284,8 @@ def test_each_of_a_set_comes_home_from_its_hover_and_from_the_end_of_it():
     assert asked == {0, 1}
 
 
-def test_a_set_in_which_one_hovers_until_its_charge_is_gone_is_left_out():
+@pytest.mark.parametrize("hovers", [3 + BRAKING, 8 + BRAKING - 1])
+def test_a_set_in_which_one_hovers_until_its_charge_is_gone_is_left_out(hovers):
     class Draining(World):
         """Each second of hovering takes charge; it is the states that say how long."""
 
@@ -274,10 +293,10 @@ def test_a_set_in_which_one_hovers_until_its_charge_is_gone_is_left_out():
             return uas == 1 or x[S.DOD] <= self.most
 
     first, second = north(steps=8, lands=False), straight(BESIDE, STILL, 8, lands=False)
-    first.x[:, S.DOD] = 2e-3 * np.arange(9)
+    first.x[:, S.DOD] = 2e-2 * np.arange(9)
     world = Draining()
     ends = [by_hand(first, n, 22 - n).x[:, S.DOD] for n in range(1, 9)]
-    world.most = ends[2][3 + BRAKING] + 1e-9  # three steps and braking, and no waiting after it
+    world.most = ends[2][hovers] + 1e-9  # enough for three steps, and to hover until then
     found = teams(world, first, second)
     assert found[0][0] == {0: 3, 1: 3}
     assert ends[2][-1] > world.most

@@ -1,12 +1,20 @@
 """Orders with fresh packs: what is visited now, what later, and when the mission is over."""
 
+from dataclasses import replace
+from itertools import permutations, product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_order_search import seconds_of, task
 
-from uas_coverage_env.planning.routing import SearchEffort, empty_routes, improve_routes
+from uas_coverage_env.planning.routing import (
+    SearchEffort,
+    empty_routes,
+    improve_routes,
+    search_orders,
+)
 from uas_coverage_env.planning.routing.trips import FreshPacks, improve_trips
 
 SOME = SearchEffort(20_000)
@@ -142,3 +150,68 @@ def test_a_flight_that_is_planned_stays_one_though_its_charge_seems_too_small():
     planned = packs(home, 2, is_planned=np.array([True]))
     assert len(improve_trips(tight, whole, SOME, 0, packs(home, 2)).routes[0]) < 3
     assert set(improve_trips(tight, whole, SOME, 0, planned).routes[0]) == set(whole.routes[0])
+
+
+def cheapest_with_a_pack_each(home, swap_s, total_weight):
+    """The cost of the best order with one fresh pack each, all of which are tried."""
+    n, n_uas = home.n_waypoints, home.n_uas
+    quickest = [{frozenset(): 0.0} for _ in range(n_uas)]
+    for u, chosen in product(range(n_uas), product((False, True), repeat=n)):
+        mine = frozenset(np.flatnonzero(chosen).tolist())
+        if mine:
+            seconds = min(seconds_of(home, u, p) for p in permutations(sorted(mine)))
+            quickest[u][mine] = seconds if seconds <= home.uas["budget_s"][u] else np.inf
+    best = np.inf
+    for flights in product(range(2 * n_uas), repeat=n):
+        sets = [
+            frozenset(np.flatnonzero(np.array(flights) == f).tolist()) for f in range(2 * n_uas)
+        ]
+        now, later = sets[:n_uas], sets[n_uas:]
+        if any(trip and not first for first, trip in zip(now, later, strict=True)):
+            continue
+        first_s = [quickest[u][now[u]] for u in range(n_uas)]
+        later_s = [quickest[u][later[u]] for u in range(n_uas)]
+        waits_s = [swap_s[u] if later[u] else 0.0 for u in range(n_uas)]
+        ends_s = np.array([first_s, waits_s, later_s]).sum(axis=0)
+        best = min(best, ends_s.max() + total_weight * (sum(first_s) + sum(later_s)))
+    return best
+
+
+@pytest.mark.parametrize(
+    ("town", "budget_s", "swap_s"),
+    [(3, 45.0, (60.0,)), (2, 50.0, (90.0, 5.0)), (2, 50.0, (5.0, 90.0)), (8, 45.0, (5.0, 90.0))],
+)
+def test_of_all_orders_with_a_fresh_pack_each_the_cheapest_is_found(town, budget_s, swap_s):
+    home = at_home(town, 5, len(swap_s), budget_s)
+    swaps_s = np.array(swap_s)
+    fresh = packs(home, 1, ground_s=swaps_s, swap_s=swaps_s)
+    orders = [found(home, fresh, seed=seed) for seed in range(3)]
+    order = min(orders, key=lambda order: order.cost_s)
+    assert order.trips
+    least_s = cheapest_with_a_pack_each(home, swap_s, SOME.total_weight)
+    assert order.cost_s == pytest.approx(least_s, abs=0.3)
+
+
+def test_several_searches_are_sorted_and_are_what_each_alone_finds_with_any_threads():
+    home = at_home(1, 20, 2, 80.0)
+    fresh = packs(home, 2)
+    searches = [
+        (replace(SOME, moves=moves), seed) for moves, seed in ((10, 3), (5_000, 1), (900, 2))
+    ]
+    alone = [improve_trips(home, empty_routes(2), *search, fresh).cost_s for search in searches]
+    for threads in (1, 3):
+        orders = search_orders(home, empty_routes(2), searches, fresh, threads)
+        assert [order.cost_s for order in orders] == sorted(alone)
+    assert search_orders(home, empty_routes(2), [(SOME, 0)])[0].trips == ()
+
+
+def test_a_later_trip_waits_for_no_release_and_goes_where_a_charge_of_now_must_not():
+    home = two_fields(45.0)
+    late = home.replace(
+        release_s=np.where(np.arange(6) < 3, 1_000.0, 0.0),
+        forbidden=np.arange(6)[None] < 3,
+    )
+    order = found(late, packs(home, 1))
+    assert set(order.routes[0]) == {3, 4, 5}
+    assert set(order.trips[0][0]) == {0, 1, 2}
+    assert not len(order.left_out)

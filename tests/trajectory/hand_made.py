@@ -7,7 +7,8 @@ from uas_coverage_baselines.trajectory.program import PlannedFlight
 from uas_coverage_env.planning.backup import Course
 from uas_coverage_env.vehicle.layout import DOD, N_STATES, VX, VZ
 
-NOTHING = Movers(*[np.zeros((0, 3))] * 2, *[np.zeros(0)] * 3, 1.0, 0)
+NOWHERE, NONE = np.zeros((0, 3)), np.zeros(0)
+NOTHING = Movers(NOWHERE, NOWHERE, NONE, NONE, NONE, 1.0, 0)
 
 
 def states_along(path_m, dod=0.1):

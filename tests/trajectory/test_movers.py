@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_made import moving
+from hand_made import NOTHING, moving
 from small_fleets import fleet_of
 from small_worlds import box, meadow, mover
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
@@ -55,7 +55,7 @@ def test_of_several_the_nearest_counts():
     far, near = ((90.0, 60.0, -20.0), STANDING), ((50.0, 60.0, -20.0), STANDING)
     for bodies in ((far, near), (near, far)):
         assert spare(moving(*bodies), here, here) == pytest.approx(20.0 - 4.0 - KEEP_M)
-    assert spare(Movers(*[np.zeros((0, 3))] * 2, *[np.zeros(0)] * 3, 1.0, 0), here) == np.inf
+    assert spare(NOTHING, here) == np.inf
 
 
 @pytest.mark.parametrize(("nearer_m", "kept"), [(0.002, False), (0.0, True), (-2.0, True)])

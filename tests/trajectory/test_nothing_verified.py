@@ -40,6 +40,18 @@ def test_a_uas_without_anything_brakes_or_flies_home():
     assert abs(moves[S.VX]) < 3.0, "it brakes"
 
 
+def test_a_uas_on_its_last_charge_brakes_too_unless_it_is_sent_home():
+    guarded = Guarded(1)
+    x = states_along([(180.0, 180.0, -20.0)], dod=0.74)[0]
+    x[S.VX] = 4.0
+    guard = seen_by(guarded, guarded.see(9, x0=x))
+    here = replace(hover(PLACES[0], 0), x=x[None])
+    brakes = braked_for(guarded.fleet, here, 0).u[0, : S.DELTA_THRUST]
+    stays, goes = (guard.evade([0], {}, home)[0][: S.DELTA_THRUST] for home in ([], [0]))
+    np.testing.assert_allclose(stays, brakes, atol=1e-9)
+    assert np.abs(goes - brakes).max() > 1e-4
+
+
 def test_a_hovering_uas_gets_out_of_the_way_of_what_comes_at_it_late_in_the_mission():
     coming = mover((40.0, 90.0, -20.0), (0.0, (0.0, -7.0, 0.0)))
     guarded = Guarded(1, moving_obstacles=(coming,))

@@ -9,6 +9,7 @@ from guarded_fleets import MARGIN_M, PLACES, Charge, Guarded, braked_for, moved
 from hand_made import NOTHING, course_along, hover, moving, states_along, straight
 from small_worlds import box
 from uas_coverage_baselines.trajectory.course import are_apart
+from uas_coverage_baselines.trajectory.safeguard import Seen
 
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.geometry.segments import segment_clearance
@@ -183,6 +184,31 @@ def test_what_passes_over_the_place_of_a_landed_uas_does_no_harm():
     assert chosen[0][0].lands
 
 
+class Spared:
+    """What moves, which leaves a path so much to spare."""
+
+    def __init__(self, spare):
+        self.spare = spare
+
+    def spare_m(self, path_m, radius_m, margin_m):
+        assert (radius_m, margin_m) == (0.36, MARGIN_M)
+        return self.spare
+
+
+def test_what_is_kept_in_full_is_enough():
+    places = np.array([(199.4, 60.0, -20.0), (199.5, 60.0, -20.0)])  # to the margin of the fence
+    course, over = course_along(places, lands=False), course_along(np.add(places, (1e-6, 0.0, 0.0)))
+    fleet = Guarded(1).fleet
+    for spare_m, clear in ((0.0, True), (-1e-9, False)):
+        seen = Seen(fleet, Spared(spare_m), MARGIN_M, Charge())
+        assert seen.is_clear(0, course) == clear
+        assert seen.may_stop(0, course, 0) == clear
+        assert not seen.may_stop(0, over, 0)
+    for spare, comes_home in ((0.0, True), (-1e-9, False)):
+        seen = Seen(fleet, NOTHING, MARGIN_M, Charge(lambda x, spare=spare: spare))
+        assert seen.comes_home(0, places[0]) == comes_home
+
+
 # stopping at once
 
 
@@ -201,6 +227,13 @@ def test_a_uas_with_nothing_to_fly_brakes_where_that_is_clear_of_what_stands(gap
     chosen = guarded.chosen({}, x0=x)
     assert (0 in chosen) == stops
     assert guarded.guard.backups.keys() == chosen.keys()
+
+
+@pytest.mark.parametrize(("gap_m", "stops"), [(-0.05, False), (0.05, True)])
+def test_a_uas_with_nothing_to_fly_brakes_where_it_stays_within_the_fence_s_margin(gap_m, stops):
+    guarded, x = Guarded(1), moved((8.0, 0.0, 0.0))
+    x[0] += 200.0 - 0.5 - gap_m - reach_m(guarded, x)
+    assert (0 in guarded.chosen({}, x0=x)) == stops
 
 
 @pytest.mark.parametrize(("gap_m", "stops"), [(-0.05, False), (0.05, True)])

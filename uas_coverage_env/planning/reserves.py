@@ -19,13 +19,6 @@ LAWNMOWER = TravelTimeModel(speed_share=0.8)
 """Of `lawnmower`: the legs of its runs, straight, at a share of the cruise speed. Chosen by hand:
 it only compares runs."""
 
-LEARNED_LEG = TravelTimeModel(speed_share=0.8, vertical_s=1.6)
-"""Of `learned-waypoint`, to a waypoint: an input of its trained network. Chosen by hand before its
-training; no command shows what it costs."""
-
-LEARNED_RETURN = TravelTimeModel(speed_share=0.8, vertical_s=-1.6, landing_s=6.0)
-"""Of `learned-waypoint`, home; likewise."""
-
 
 class Reserve(NamedTuple):
     """What a planner's routes allow for, and leave in the battery or before the mission ends."""
@@ -72,7 +65,7 @@ LEARNED_ROUTE = TRAJECTORY._replace(spare_s=8.0)
 """Of `learned-route`: that of the routes its networks learnt from; they read these numbers."""
 
 ORDER_GUIDE = Reserve(kept_s=25.0, landing_s=4.0)
-"""Of the order that `milp-mpc-guided` follows, somewhat more than `MILP_RESERVE` and
+"""Of the order of `milp-mpc` (`order=search`, and in wind), somewhat more than `MILP_RESERVE` and
 `MILP_BRAKING_S` hold back for braking and landing. Chosen by hand."""
 
 BRAKING_S = 14.0
@@ -86,7 +79,3 @@ first version, in which braking did not fit; the command is not recorded. What i
 
 ROUTE_HOME_RESERVE = Reserve(kept_s=30.0)
 """Of UAS that `milp-mpc` flies home along a route: others may be in the way. Chosen by hand."""
-
-LEARNED_CLOCK_RESERVE = Reserve(kept_s=18.0)
-"""Of `learned-waypoint`, before the mission ends: what return mode keeps of it. An input of its
-trained network."""

@@ -39,10 +39,11 @@ class Workers:
             return "as many flights side by side as the cluster has cores"
         return f"{self.count} flight{'' if self.count == 1 else 's'} side by side"
 
-    def run(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Any], None, None]:
+    def run(self, jobs: Iterable[Job | None]) -> Generator[tuple[Job, Any], None, None]:
         """Do jobs; each result as soon as it is there, in no particular order.
 
-        Jobs are taken as there is room for them. One whose process was killed, or whose machine is
+        Jobs are taken as there is room for them; None in their place says that the next one comes
+        of a result that is under way. One whose process was killed, or whose machine is
         gone, is done again by another one. What a job raises is raised here.
 
         Raises:
@@ -51,7 +52,8 @@ class Workers:
         """
         if self.backend == "process" and self.count == 1:
             for job in jobs:
-                yield job, job.call(*job.arguments)
+                if job is not None:
+                    yield job, job.call(*job.arguments)
             return
         coming, again, losses = iter(jobs), deque[Job](), Counter[str]()
         given_up: list[tuple[Job, Lost]] = []

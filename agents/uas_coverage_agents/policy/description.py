@@ -158,13 +158,18 @@ class ValidationScore(StrictModel):
     measures: dict[Name, Interval]
 
 
+Interface = Literal["route", "route-velocity", "environment"]
+"""What the outputs of a network mean: routes, these and velocities along them, or the actions of an
+environment."""
+
+
 class PolicyDescription(StrictModel):
     """The content of `policy.json`.
 
     Attributes:
         format: "uas-coverage-policy".
         version: Of the format.
-        interface: What its outputs mean: which waypoint next, a velocity, routes, or both of these.
+        interface: What its outputs mean.
         network: What computes them.
         observation: What it reads.
         scenarios: What it was trained on.
@@ -176,7 +181,7 @@ class PolicyDescription(StrictModel):
 
     format: Literal["uas-coverage-policy"] = "uas-coverage-policy"
     version: Annotated[int, Field(ge=1, le=1)] = 1
-    interface: Literal["waypoint", "velocity", "route", "route-velocity"]
+    interface: Interface
     network: Network
     observation: Observation
     scenarios: ScenarioFamily

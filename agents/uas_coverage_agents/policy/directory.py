@@ -76,7 +76,7 @@ def weights_sha256(tensors: Mapping[str, NDArray[np.floating]]) -> str:
 
 
 def _as_kept(tensors: Mapping[str, NDArray[np.floating]]) -> dict[str, NDArray[np.float32]]:
-    return {name: np.ascontiguousarray(each, np.float32) for name, each in tensors.items()}
+    return {name: np.array(each, np.float32, order="C") for name, each in tensors.items()}
 
 
 def load_policy(directory: str | Path) -> Policy:

@@ -5,6 +5,8 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Protocol
 
+from pydantic import Field
+
 from uas_coverage_agents.policy.directory import Policy, load_policy
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Assistants, AssistedOptions
@@ -32,21 +34,45 @@ class PolicyRunner(Protocol):
 RUNNERS = {
     "route": "uas_coverage_agents.route.policy_runner:RouteRunner",
     "route-velocity": "uas_coverage_agents.route.velocity_runner:RouteVelocityRunner",
-    "velocity": "uas_coverage_agents.velocity.policy_runner:VelocityRunner",
-    "waypoint": "uas_coverage_agents.waypoint.policy_runner:WaypointRunner",
+    "environment": "uas_coverage_agents.training.policy_runner:EnvironmentRunner",
 }
 """Interface of a policy -> entry point of its runner, `PolicyRunner(policy, assistants)`; loaded
 where it flies, since runners import this package."""
 
 
-def runner_of(policy: Policy, assistants: Assistants) -> PolicyRunner:
+def runner_of(policy: Policy, assistants: Assistants, *, trust: bool = False) -> PolicyRunner:
     """The runner that flies a policy.
 
+    Args:
+        policy: The policy.
+        assistants: Those that fly along.
+        trust: Whether a class of its author's own may be imported, where it names one.
+
     Raises:
+        InputError: What it needs is not installed.
         ValueError: The policy cannot be flown; says why.
     """
     interface = policy.description.interface
-    return EntryPoint(interface, RUNNERS[interface], "").load()(policy, assistants)
+    try:
+        runner = EntryPoint(interface, RUNNERS[interface], "").load()
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("uas_coverage"):
+            raise  # ours is always there
+        raise InputError(
+            f"it flies by the library that trained it, and {error.name} is not installed: "
+            f"python -m pip install 'uas-coverage-env[learn]'"
+        ) from error
+    more = {"trust": trust} if interface == "environment" else {}
+    return runner(policy, assistants, **more)
+
+
+class PolicyOptions(AssistedOptions):
+    """Options of `policy:DIR`."""
+
+    trust: bool = Field(
+        default=False,
+        description="import the class of its author's own that the policy names",
+    )
 
 
 class PolicyPlanner:
@@ -60,7 +86,7 @@ class PolicyPlanner:
         InputError: The directory holds no policy that can be flown; names file and field.
     """
 
-    Options = AssistedOptions
+    Options: type[AssistedOptions] = PolicyOptions
     argument = "DIR"
 
     def __init__(self, options: AssistedOptions | None, argument: str | Path) -> None:
@@ -70,11 +96,12 @@ class PolicyPlanner:
         self.policy = load_policy(argument)
         try:
             self._runner = self._make_runner()
-        except ValueError as error:
+        except (InputError, ValueError) as error:
             raise InputError(f"{self.argument}: cannot be flown: {error}") from error
 
     def _make_runner(self) -> PolicyRunner:
-        return runner_of(self.policy, self.assistants)
+        trust = getattr(self.options, "trust", False)
+        return runner_of(self.policy, self.assistants, trust=trust)
 
     @property
     def fingerprint(self) -> str:

@@ -3,28 +3,72 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_agents.route.clock import IN_THE_AIR, home_seconds, leg_seconds
-from uas_coverage_agents.route.improvement import improve
 from uas_coverage_agents.route.layers import Layers
-from uas_coverage_agents.route.mission import MissionMaker
-from uas_coverage_agents.route.order import SPARE_S, build, no_record, route_workspace
-from uas_coverage_env.entities.state import LANDED
+from uas_coverage_agents.route.order import (
+    IN_THE_AIR,
+    WEIGHT,
+    build,
+    home_seconds,
+    leg_seconds,
+    no_record,
+    route_workspace,
+)
+from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.mission.access import Access
 from uas_coverage_env.planning.following import Following
+from uas_coverage_env.planning.reserves import LEARNED_ROUTE
+from uas_coverage_env.planning.routing import RoutingProblem, SearchEffort, improve_routes
+from uas_coverage_env.planning.routing.legs import Legs
+from uas_coverage_env.planning.routing.search import arrays_of, routes_of
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
 BoolArray = NDArray[np.bool_]
 SAMPLES = 64
 """Routes that are built before the best are flown; the first without noise."""
 
+CHANGES = 60_000
+"""Changes of the best of these that are tried to make it cheaper."""
+
 _NOISE = 1.0
 _AGAIN_STEPS = 10
+_HOTTEST_S = 1.5  # of the search that makes routes cheaper: they are good to begin with
+_OPENS_AFTER = 0.75  # share of the mean flight after which what is blocked may be open
+_LONE_UNIT_S = 5.0
+
+
+class RouteProblems:
+    """The fleet as the order networks and the search read it.
+
+    Args:
+        brief: The mission.
+
+    Attributes:
+        unit_s: Mean leg time from a waypoint to its nearest neighbour.
+    """
+
+    def __init__(self, brief: MissionBrief) -> None:
+        self._brief, self._legs = brief, Legs(brief)
+        legs_s = LEARNED_ROUTE.legs_share * self._legs.between_s.max(axis=0)
+        n = len(legs_s)
+        nearest_s = (legs_s + 1e9 * np.eye(n)).min(axis=1) if n > 1 else [_LONE_UNIT_S]
+        self.unit_s = max(float(np.mean(nearest_s)), 0.1)
+
+    def seen(self, swarm: SwarmState, works: BoolArray, wanted: BoolArray) -> RoutingProblem:
+        """The routing problem from here: `wanted` waypoints (W,), for UAS that `works` (U,)."""
+        works = works & (swarm.status == FLYING)
+        problem = RoutingProblem.seen(
+            self._brief, swarm, self._legs, works, LEARNED_ROUTE, open_waypoints=wanted
+        )
+        # with the landing, but of those that have not set off
+        home_s = LEARNED_ROUTE.legs_share * problem.uas["idle_s"] + LEARNED_ROUTE.landing_s
+        return problem.replace(idle_s=np.where(works & swarm.departed, home_s, 0.0))
 
 
 class FleetRoutes:
@@ -54,7 +98,7 @@ class FleetRoutes:
     ) -> None:
         self._score, self._home_score = score, home_score
         self._samples, self._changes = samples, changes
-        self._following, self._missions = Following(brief), MissionMaker(brief)
+        self._following, self._problems = Following(brief), RouteProblems(brief)
         self.view, self._guided = self._following.view, self._following.guided
         self._has_way: BoolArray = np.asarray(Access(brief).has_way.any(axis=0))
         self.by_guidance = False
@@ -93,16 +137,16 @@ class FleetRoutes:
             reached_s: When each UAS reaches the waypoints of its route, and home [s].
         """
         for u, at_s in enumerate(reached_s):
-            place, before_m = IN_THE_AIR, self._mission.here_m[u]
+            place, before = IN_THE_AIR, len(self._more_s) + u
             took_s = np.diff(at_s, prepend=0.0)
             for w, seconds in zip(self.of(u).tolist(), took_s, strict=False):
-                leg_s = leg_seconds(self._mission, u, place, before_m, w)
+                leg_s = leg_seconds(self._task, u, place, before, w)
                 if place != IN_THE_AIR:
                     self._more_s[place, w] += max(seconds - leg_s, 0.0)
-                before_m = before_m if place == IN_THE_AIR else self._mission.place_m[place]
+                    before = place
                 place = w
             if place != IN_THE_AIR:
-                home_s = home_seconds(self._mission, u, place, before_m)
+                home_s = home_seconds(self._task, u, place, before)
                 self._more_home_s[u, place] += max(took_s[-1] - home_s, 0.0)
         self._build(*self._situation)
 
@@ -172,18 +216,37 @@ class FleetRoutes:
     def _build(
         self, swarm: SwarmState, wanted: BoolArray, blocked: BoolArray, works: BoolArray
     ) -> None:
-        mission = self._missions.mission(swarm, works, blocked)
-        mission = self._mission = mission._replace(
-            between_s=mission.between_s + self._more_s, home_s=mission.home_s + self._more_home_s
+        problem = self._problems.seen(swarm, works, wanted)
+        problem = problem.replace(
+            between_s=problem.between_s + self._more_s, home_s=problem.home_s + self._more_home_s
         )
+        self._task = arrays_of(problem, WEIGHT)
+        stages = np.array([wanted & ~blocked, wanted & blocked])
         routes, lengths = self._routes.copy(), self._lengths.copy()
         best_s = np.inf
         for sample in range(max(self._samples, 1)):
             cost_s = build(
-                mission, self._score, self._home_score, wanted, _NOISE if sample else 0.0,
-                self._rng, self._workspace, self._record, routes, lengths,
+                self._task, self._problems.unit_s, self._score, self._home_score, stages,
+                _NOISE if sample else 0.0, self._rng, self._workspace, self._record, routes,
+                lengths,
             )  # fmt: skip
             if cost_s < best_s:
                 best_s = cost_s
                 self._routes[:], self._lengths[:] = routes, lengths
-        improve(mission, self._changes, SPARE_S, self._rng, self._routes, self._lengths)
+        if self._changes:
+            self._improve(problem, blocked)
+
+    def _improve(self, problem: RoutingProblem, blocked: BoolArray) -> None:
+        """Make the routes cheaper; when what is blocked opens is not known, but expected."""
+        effort = SearchEffort(self._changes, hottest_s=_HOTTEST_S, total_weight=WEIGHT)
+        seed = int(self._rng.integers(2**31))
+        order = routes_of(self.of_all())
+        if blocked[problem.open_waypoints].any() and problem.may_fly.any():
+            known = improve_routes(problem, order, replace(effort, moves=0), 0)
+            opens_s = _OPENS_AFTER * float(known.seconds[problem.may_fly].mean())
+            later = problem.replace(release_s=np.where(blocked, opens_s, 0.0))
+            found = improve_routes(later, order, effort, seed)
+            if len(found.left_out) <= len(known.left_out):
+                self.take(found.routes)
+                return
+        self.take(improve_routes(problem, order, effort, seed).routes)

@@ -5,7 +5,7 @@ from pathlib import Path
 from pydantic import Field
 
 from uas_coverage_agents.policy.planner import PolicyPlanner
-from uas_coverage_agents.route.improvement import CHANGES
+from uas_coverage_agents.route.fleet_routes import CHANGES
 from uas_coverage_agents.route.policy_runner import SAMPLES, RouteRunner
 from uas_coverage_agents.route.rehearsal import CANDIDATES
 from uas_coverage_env.flight import AssistedOptions

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
 from uas_coverage_agents.policy.route_networks import RouteNetworks
-from uas_coverage_agents.route.fleet_routes import SAMPLES, FleetRoutes
-from uas_coverage_agents.route.improvement import CHANGES
+from uas_coverage_agents.route.fleet_routes import CHANGES, SAMPLES, FleetRoutes
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.layout import LAYOUT, observed_groups, route_networks
 from uas_coverage_agents.route.leg_flight import AHEAD
 from uas_coverage_agents.route.leg_plan import plan_along
 from uas_coverage_agents.route.leg_search import HORIZON, search_workspace
-from uas_coverage_agents.route.mission import WEIGHT
+from uas_coverage_agents.route.order import WEIGHT
 from uas_coverage_agents.route.rehearsal import CANDIDATES, Rehearsal, in_large_missions
 from uas_coverage_env.flight import Assistants
 from uas_coverage_env.mission import MissionBrief, first_sight

@@ -4,16 +4,39 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Annotated
 
 from matplotlib.figure import Figure
+from pydantic import Field
 
-from uas_coverage_agents.training.checkpoint import CurvePoint
 from uas_coverage_env.files.plain_files import read_text, write_atomically
+from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.replay.figures import png_of, training_figure
 from uas_coverage_env.replay.figures.training import CURVE, Curve, baseline_curves
 
 TABLE = CURVE
 PICTURE = "learning_curve.png"
+
+Seconds = Annotated[float, Field(ge=0.0)]
+
+
+class CurvePoint(StrictModel):
+    """How the policy flew the validation missions at one moment of its training; means.
+
+    The return is that of the environments' default reward, whatever is learned from; None where a
+    version flew it that did not keep it.
+    """
+
+    steps: Annotated[int, Field(ge=0)]
+    process_s: Seconds
+    wall_s: Seconds
+    coverage: float
+    all_home: float
+    violations: float
+    energy_Wh: float
+    flight_steps: float
+    episode_return: float | None = None
+
 
 _HEADINGS = {"episode_return": "return"}  # Python has another use for the word
 

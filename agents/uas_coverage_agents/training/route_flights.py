@@ -1,5 +1,6 @@
 """Flights along labelled routes in free air, from which the flight network learns their times."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,10 +20,11 @@ from uas_coverage_agents.route.leg_flight import (
     observe_places,
     weigh,
 )
-from uas_coverage_agents.training.route_labels import Label, town_of
+from uas_coverage_agents.training.route_labels import Label
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
+from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.world import build_arena
@@ -97,11 +99,11 @@ def _fly(uas, vehicle, rules, places, layers, noise_s, rng, rows, notes):
     return notes.shape[0], covered
 
 
-def courses_of(labels: list[Label]) -> list[Course]:
+def courses_of(labels: list[Label], town_of: Callable[[Label], Scenario]) -> list[Course]:
     """Every route of two waypoints or more, with its UAS."""
     courses = []
     for label in labels:
-        scenario = town_of(label.seed)
+        scenario = town_of(label)
         arena = build_arena(scenario)
         for u, (route, steps) in enumerate(zip(label.routes, label.steps, strict=True)):
             if len(route) > 1 and steps:

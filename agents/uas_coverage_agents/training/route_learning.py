@@ -1,31 +1,28 @@
-"""Train a route policy by imitation: `python -m uas_coverage_agents.training.route_learning OUT`.
+"""Routes by imitation: `uas-coverage train learned-route`.
 
-Three steps: `trajectory` labels towns with the routes that it would fly (resumable); the order
-networks learn its choices; the flight network learns from flights along those routes how long they
-take, and so do the flights that it then weighs. Nothing here is tuned on the set `test`.
+Three stages: `trajectory` labels towns with the routes that it would fly; the order networks learn
+its choices; the flight network learns from flights along those routes how long they take, and so do
+the flights that it then weighs. Nothing here is tuned on the set `test`.
 """
 
-import argparse
-import csv
-import platform
-import time
-from importlib.metadata import version
-from pathlib import Path
+import json
+from typing import Annotated
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from pydantic import Field
 from torch import nn
 
-from uas_coverage_agents.policy import PolicyDescription, save_policy
-from uas_coverage_agents.policy.description import ScenarioFamily, Towns, Training
-from uas_coverage_agents.route.clock import DONE, IN_THE_AIR, Mission
+from uas_coverage_agents.route.fleet_routes import RouteProblems
 from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.layout import route_networks
 from uas_coverage_agents.route.leg_flight import N_FLIGHT
-from uas_coverage_agents.route.mission import MissionMaker
 from uas_coverage_agents.route.order import (
+    DONE,
+    IN_THE_AIR,
     N_ORDER,
+    WEIGHT,
     K,
     RouteWorkspace,
     move,
@@ -34,24 +31,51 @@ from uas_coverage_agents.route.order import (
     route_workspace,
 )
 from uas_coverage_agents.route.policy_runner import observation
-from uas_coverage_agents.training.route_flights import courses_of, flown
-from uas_coverage_agents.training.route_labels import (
-    FIRST_SEED,
-    N_OBSTACLES,
-    N_UAS,
-    N_WAYPOINTS,
-    VALIDATION_SEED,
-    Label,
-    labelled,
-    town_of,
-)
+from uas_coverage_agents.training.learner import Arrays, Learned, Told
+from uas_coverage_agents.training.missions import Missions
+from uas_coverage_agents.training.route_flights import Samples, courses_of, flown
+from uas_coverage_agents.training.route_labels import Label, label_of
+from uas_coverage_agents.training.settings import Count, LearnerSettings, own_settings
+from uas_coverage_agents.training.torch_state import Modules
+from uas_coverage_env.files.strict_toml import InputError, StrictModel
 from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.planning.routing.route_time import RoutingArrays
+from uas_coverage_env.planning.routing.search import arrays_of
+from uas_coverage_env.scenario import Scenario
 
 HIDDEN = 32
-ORDER_EPOCHS, ORDER_BATCH, ORDER_RATE = 60, 256, 2e-3
-FLIGHT_TOWNS, FLIGHT_ROUNDS, FLIGHT_EPOCHS, FLIGHT_BATCH, FLIGHT_RATE = 80, 5, 12, 512, 3e-3
-NOISE_S = (0.2, 1.0)
-MOST_SAMPLES = 500_000
+_NOISE_S = (0.2, 1.0)
+_MOST_SAMPLES = 500_000
+
+Rate = Annotated[float, Field(gt=0.0)]
+
+
+class RouteSettings(StrictModel):
+    """How much is labelled and learned.
+
+    Attributes:
+        towns: Labelled to learn from.
+        validation: Labelled to see what was learned.
+        order_epochs: Passes over all choices.
+        order_batch: Choices of a gradient step.
+        order_rate: At the start.
+        flight_towns: Along whose routes is flown.
+        flight_rounds: Of flying and learning; the last rounds of the training.
+        flight_epochs: Passes over all samples, in each.
+        flight_batch: Samples of a gradient step.
+        flight_rate: At the start.
+    """
+
+    towns: Count = 250
+    validation: Count = 30
+    order_epochs: Count = 60
+    order_batch: Count = 256
+    order_rate: Rate = 2e-3
+    flight_towns: Count = 80
+    flight_rounds: Count = 5
+    flight_epochs: Count = 12
+    flight_batch: Count = 512
+    flight_rate: Rate = 3e-3
 
 
 def _network(inputs: int) -> nn.Sequential:
@@ -71,36 +95,38 @@ def _tensors(name: str, network: nn.Sequential) -> dict[str, NDArray[np.float64]
 
 
 def _choices(
-    mission: Mission, routes: list[list[int]], room: RouteWorkspace
+    task: RoutingArrays, unit_s: float, routes: list[list[int]], room: RouteWorkspace
 ) -> list[tuple[NDArray, NDArray, int]]:
     """What is read, may be chosen and was chosen, when labelled routes are built again."""
-    n_uas, n_waypoints = mission.from_s.shape
+    n_uas, n_waypoints = task.first.shape
     ready_s, place = np.zeros(n_uas), np.full(n_uas, IN_THE_AIR)
-    before_m, open_ = mission.here_m.copy(), np.ones(n_waypoints, np.bool_)
+    before, open_ = n_waypoints + np.arange(n_uas), np.ones(n_waypoints, np.bool_)
     left = [list(route) for route in routes]
     found = []
     while open_.any():
         u = next_free(place, ready_s)
         if u == -1 or place[u] == DONE:
             break
-        observe_choices(mission, u, ready_s, place, before_m, open_, room)
+        observe_choices(task, unit_s, u, ready_s, place, before, open_, room)
         w = left[u].pop(0) if left[u] else -1
         where = np.flatnonzero(room.candidates == w) if w >= 0 else np.array([K])
         if len(where) and room.legal[where[0]] and room.legal.sum() > 1:
             found.append((room.rows.astype(np.float32), room.legal.copy(), int(where[0])))
-        move(mission, u, w, ready_s, place, before_m, open_)
+        move(task, u, w, ready_s, place, before, open_)
     return found
 
 
-def choices_of(labels: list[Label]) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+def choices_of(
+    labels: list[Label], missions: Missions
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """All decisions of labelled towns: (N, K+1, N_ORDER), (N, K+1), (N,)."""
     room, found = route_workspace(), []
     for label in labels:
-        brief = MissionBrief.of(town_of(label.seed))
+        brief = MissionBrief.of(town_of(label.number, missions))
         swarm = first_sight(brief)
-        late = np.zeros(len(brief.waypoints), np.bool_)
-        mission = MissionMaker(brief).mission(swarm, np.ones(len(brief.uas), np.bool_), late)
-        found += _choices(mission, label.routes, room)
+        problems, works = RouteProblems(brief), np.ones(len(brief.uas), np.bool_)
+        task = arrays_of(problems.seen(swarm, works, swarm.uncovered), WEIGHT)
+        found += _choices(task, problems.unit_s, label.routes, room)
     rows, legal, choice = zip(*found, strict=True)
     return (
         torch.tensor(np.array(rows)),
@@ -122,130 +148,140 @@ class OrderNetworks(nn.Module):
         return scores.masked_fill(~legal, -1e9)
 
 
-def learn_order(
-    train: list[Label], validation: list[Label], curve: list[dict[str, float]]
-) -> OrderNetworks:
-    """Clone the planner's choices."""
-    rows, legal, choice = choices_of(train)
-    seen = choices_of(validation)
-    networks = OrderNetworks()
-    optimiser = torch.optim.Adam(networks.parameters(), ORDER_RATE)
-    for epoch in range(ORDER_EPOCHS):
-        optimiser.param_groups[0]["lr"] = ORDER_RATE * (1.01 - epoch / ORDER_EPOCHS)
-        for batch in torch.randperm(len(rows)).split(ORDER_BATCH):
-            scores = networks(rows[batch], legal[batch])
-            loss = nn.functional.cross_entropy(scores, choice[batch])
-            optimiser.zero_grad()
-            loss.backward()
-            optimiser.step()
-        if epoch % 10 == 9:
+class RouteLearning:
+    """See `Learner`: the rounds label towns, then one learns the order, then the others fly.
+
+    Args:
+        settings: Of the training; `[learning]` is `RouteSettings`.
+        missions: From which the towns are.
+        seed: Of networks, samples and flights.
+
+    Raises:
+        InputError: A setting is not for this learner, or there are too few rounds.
+    """
+
+    def __init__(self, settings: LearnerSettings, missions: Missions, seed: int) -> None:
+        self._own = own_settings(settings, RouteSettings)
+        self._labelling = settings.rounds - 1 - self._own.flight_rounds
+        if self._labelling < 1:
+            raise InputError(
+                f"rounds is {settings.rounds}; give {self._own.flight_rounds + 2} or more: some to "
+                f"label towns, one to learn the order, {self._own.flight_rounds} to learn flying"
+            )
+        torch.manual_seed(seed)
+        self._missions, self._rng = missions, np.random.default_rng(seed)
+        self._order, self._flight = OrderNetworks(), _network(N_FLIGHT)
+        with torch.no_grad():  # straight on at full speed at first
+            for parameter in list(self._flight.parameters())[-2:]:
+                parameter.zero_()
+        self._networks = Modules(order=self._order, flight=self._flight)
+        self._labels: list[Label] = []
+        self._samples = Samples(np.zeros((0, N_FLIGHT), np.float32), np.zeros(0, np.float32))
+
+    @property
+    def steps(self) -> int:
+        """Samples of flights, and towns, that were learned from."""
+        return len(self._samples.rows) + len(self._labels)
+
+    def learn(self, number: int, told: Told) -> None:
+        """Label, learn the order, or fly and learn."""
+        own = self._own
+        if number < self._labelling:
+            wanted = (own.towns + own.validation) * (number + 1) // self._labelling
+            while len(self._labels) < wanted:
+                # those of validation first: each number below zero is one of them
+                town = len(self._labels) - own.validation
+                self._labels.append(label_of(town, town_of(town, self._missions)))
+            told.add(self.steps, towns=len(self._labels))
+        elif number == self._labelling:
+            self._learn_order(told)
+        else:
+            self._learn_flight(told)
+
+    def state_dict(self) -> Arrays:
+        """Labels, networks and samples."""
+        text = json.dumps([label._asdict() for label in self._labels]).encode()
+        return {
+            **self._networks.state_dict(),
+            "labels": np.frombuffer(text, np.uint8).copy(),
+            "rows": self._samples.rows,
+            "beyond_s": self._samples.beyond_s,
+        }
+
+    def load_state_dict(self, state: Arrays) -> None:
+        """See `Learner`."""
+        self._networks.load_state_dict(state)
+        labels = json.loads(state["labels"].tobytes())
+        self._labels = [Label(**row) for row in labels]
+        self._samples = Samples(state["rows"], state["beyond_s"])
+
+    def learned(self) -> Learned:
+        """The networks, for `RouteRunner`."""
+        tensors = {
+            **_tensors("order", self._order.order),
+            **_tensors("home", self._order.home),
+            **_tensors("flight", self._flight),
+        }
+        return Learned("route", route_networks(HIDDEN), observation(), tensors)
+
+    def _learn_order(self, told: Told) -> None:
+        """Clone the planner's choices."""
+        own = self._own
+        rows, legal, choice = choices_of(self._labels[own.validation :], self._missions)
+        seen = choices_of(self._labels[: own.validation], self._missions)
+        optimiser = torch.optim.Adam(self._order.parameters(), own.order_rate)
+        for epoch in range(own.order_epochs):
+            optimiser.param_groups[0]["lr"] = own.order_rate * (1.01 - epoch / own.order_epochs)
+            for batch in torch.randperm(len(rows)).split(own.order_batch):
+                scores = self._order(rows[batch], legal[batch])
+                loss = nn.functional.cross_entropy(scores, choice[batch])
+                optimiser.zero_grad()
+                loss.backward()
+                optimiser.step()
             with torch.no_grad():
-                scores = networks(seen[0], seen[1])
+                scores = self._order(seen[0], seen[1])
                 agree = float((scores.argmax(1) == seen[2]).float().mean())
                 unseen = float(nn.functional.cross_entropy(scores, seen[2]))
-            curve.append({"epoch": epoch + 1, "order_loss": unseen, "order_agreement": agree})
-            print(f"order, epoch {epoch + 1}: loss {unseen:.3f}, agreement {agree:.3f}", flush=True)
-    return networks
+            told.add(epoch + 1, order_loss=unseen, order_agreement=agree)
+
+    def _learn_flight(self, told: Told) -> None:
+        """Fitted values: fly with what is known, learn how long it took."""
+        own, (rows, beyond_s) = self._own, self._samples
+        unseen, first = self._labels[: own.validation], self._labels[own.validation :]
+        courses = courses_of(first[: own.flight_towns], self._town)
+        for noise_s in _NOISE_S:
+            samples, _ = flown(courses, _layers(self._flight), noise_s, self._rng)
+            rows = np.concatenate([rows, samples.rows])[-_MOST_SAMPLES:]
+            beyond_s = np.concatenate([beyond_s, samples.beyond_s])[-_MOST_SAMPLES:]
+        self._samples = Samples(rows, beyond_s)
+        _fit(self._flight, torch.tensor(rows), torch.tensor(beyond_s), own)
+        courses = courses_of(unseen, self._town)
+        _, share = flown(courses, _layers(self._flight), 0.0, self._rng)
+        told.add(self.steps, steps_over_planned=share)
+
+    def _town(self, label: Label) -> Scenario:
+        return town_of(label.number, self._missions)
+
+
+def town_of(number: int, missions: Missions) -> Scenario:
+    """The town of a label: of validation where it is below zero."""
+    if number >= 0:
+        return missions.mission(number)
+    return missions.unseen(-1 - number)[1]
 
 
 def _layers(network: nn.Sequential) -> Layers:
     return layers_of(route_networks(HIDDEN).flight, _tensors("flight", network), "flight.")
 
 
-def learn_flight(
-    train: list[Label], validation: list[Label], seed: int, curve: list[dict[str, float]]
-) -> nn.Sequential:
-    """Fitted values: fly with what is known, learn how long it took, and again."""
-    torch.manual_seed(seed)  # so that it does not depend on how the order was learned
-    rng = np.random.default_rng(seed)
-    courses, unseen = courses_of(train[:FLIGHT_TOWNS]), courses_of(validation)
-    network = _network(N_FLIGHT)
-    with torch.no_grad():  # straight on at full speed at first
-        for parameter in list(network.parameters())[-2:]:
-            parameter.zero_()
-    rows, beyond_s = np.zeros((0, N_FLIGHT), np.float32), np.zeros(0, np.float32)
-    for number in range(FLIGHT_ROUNDS + 1):
-        _, share = flown(unseen, _layers(network), 0.0, rng)
-        curve.append({"round": number, "steps_over_planned": share})
-        print(f"flight, round {number}: {share:.4f} times the planned steps", flush=True)
-        if number == FLIGHT_ROUNDS:
-            return network
-        for noise_s in NOISE_S:
-            samples, _ = flown(courses, _layers(network), noise_s, rng)
-            rows = np.concatenate([rows, samples.rows])[-MOST_SAMPLES:]
-            beyond_s = np.concatenate([beyond_s, samples.beyond_s])[-MOST_SAMPLES:]
-        _fit(network, torch.tensor(rows), torch.tensor(beyond_s))
-    return network
-
-
-def _fit(network: nn.Sequential, rows: torch.Tensor, beyond_s: torch.Tensor) -> None:
-    optimiser = torch.optim.Adam(network.parameters(), FLIGHT_RATE)
-    for epoch in range(FLIGHT_EPOCHS):
-        optimiser.param_groups[0]["lr"] = FLIGHT_RATE * (1.01 - epoch / FLIGHT_EPOCHS)
-        for batch in torch.randperm(len(rows)).split(FLIGHT_BATCH):
+def _fit(
+    network: nn.Sequential, rows: torch.Tensor, beyond_s: torch.Tensor, own: RouteSettings
+) -> None:
+    optimiser = torch.optim.Adam(network.parameters(), own.flight_rate)
+    for epoch in range(own.flight_epochs):
+        optimiser.param_groups[0]["lr"] = own.flight_rate * (1.01 - epoch / own.flight_epochs)
+        for batch in torch.randperm(len(rows)).split(own.flight_batch):
             loss = nn.functional.smooth_l1_loss(network(rows[batch])[:, 0], beyond_s[batch])
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
-
-
-def run_script() -> None:
-    """Label, learn, save."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--towns", type=int, default=250)
-    parser.add_argument("--validation", type=int, default=30)
-    parser.add_argument("--seed", type=int, default=0)
-    asked = parser.parse_args()
-    began = time.process_time(), time.monotonic()
-    torch.set_num_threads(1)
-    torch.manual_seed(asked.seed)
-    asked.out.mkdir(parents=True, exist_ok=True)
-    validation = labelled(asked.out / "validation.json", VALIDATION_SEED, asked.validation)
-    train = labelled(asked.out / "towns.json", FIRST_SEED, asked.towns)
-    curve: list[dict[str, float]] = []
-    order = learn_order(train, validation, curve)
-    flight = learn_flight(train, validation, asked.seed, curve)
-    settings = {
-        name.lower(): value for name, value in globals().items()
-        if name.isupper() and isinstance(value, int | float) and name not in ("K",)
-    }  # fmt: skip
-    description = PolicyDescription(
-        interface="route",
-        network=route_networks(HIDDEN),
-        observation=observation(),
-        scenarios=ScenarioFamily(
-            name="generated",
-            towns=Towns(
-                first_seed=FIRST_SEED,
-                n_uas=N_UAS,
-                n_waypoints=N_WAYPOINTS,
-                n_obstacles=N_OBSTACLES,
-            ),
-        ),
-        training=Training(
-            algorithm="imitation of trajectory",
-            settings={**settings, "towns": asked.towns},
-            seed=asked.seed,
-            steps=0,
-            process_s=round(time.process_time() - began[0], 1),
-            wall_s=round(time.monotonic() - began[1], 1),
-            machine=f"{platform.machine()}, {platform.system()}",
-        ),
-        versions={name: version(name) for name in ("numpy", "torch")},
-    )
-    tensors = {
-        **_tensors("order", order.order),
-        **_tensors("home", order.home),
-        **_tensors("flight", flight),
-    }
-    save_policy(asked.out / "policy", description, tensors)
-    names = sorted({name for row in curve for name in row})
-    with (asked.out / "learning_curve.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, names)
-        writer.writeheader()
-        writer.writerows(curve)
-
-
-if __name__ == "__main__":
-    run_script()

@@ -1,7 +1,6 @@
-"""Which scenarios a learner flies: towns drawn from seeds, or one scenario."""
+"""Generated towns that a policy is validated on."""
 
 from uas_coverage_agents.policy.description import ScenarioFamily, Towns
-from uas_coverage_agents.training.config import TrainingScenarios
 from uas_coverage_env.scenario import Scenario, load_scenario, sample_scenario
 
 VALIDATION = Towns(first_seed=900_000, n_uas=(1, 4), n_waypoints=(20, 60), n_obstacles=(5, 20))
@@ -13,14 +12,6 @@ def town(towns: Towns, number: int) -> Scenario:
     return sample_scenario(
         towns.first_seed + number, towns.n_uas, towns.n_waypoints, towns.n_obstacles
     )
-
-
-def training_scenarios(scenarios: TrainingScenarios, seed: int) -> list[Scenario]:
-    """What a run with this seed trains on; every seed has towns of its own."""
-    towns, pool = scenarios.family.towns, scenarios.pool
-    if towns is None:
-        return [load_scenario(scenarios.family.name)]
-    return [town(towns, seed * pool + number) for number in range(pool)]
 
 
 def validation_scenarios(family: ScenarioFamily, count: int) -> list[Scenario]:

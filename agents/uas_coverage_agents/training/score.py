@@ -12,6 +12,7 @@ from uas_coverage_agents.policy import Policy
 from uas_coverage_agents.policy.description import Interval, ValidationScore
 from uas_coverage_agents.policy.directory import weights_sha256
 from uas_coverage_agents.policy.planner import runner_of
+from uas_coverage_agents.training.curve import CurvePoint
 from uas_coverage_env.files.errors import PlannerError
 from uas_coverage_env.flight import Assistants, Planner
 from uas_coverage_env.leaderboard import PlannerSpec, Row
@@ -52,51 +53,40 @@ class PolicySpec(PlannerSpec):
     policy: Any = field(default=None, compare=False)
 
     @classmethod
-    def of(cls, policy: Policy, *, safety_filter: bool, return_mode: bool) -> Self:
-        """A policy with the assistants that it flies with."""
+    def of(cls, policy: Policy, seed: int | None = None) -> Self:
+        """A policy of a training with this seed; its rules are those of the flight."""
         interface, steps = policy.description.interface, policy.description.training.steps
-        options = {"safety_filter": safety_filter, "return_mode": return_mode}
         sha256 = weights_sha256(policy.tensors)
         package = __name__.partition(".")[0]
-        return cls(f"policy after {steps} steps", interface, options, sha256, package, policy)
+        which = "" if seed is None else f" of seed {seed}"
+        return cls(f"policy{which} after {steps} steps", interface, {}, sha256, package, policy)
 
     def load(self) -> Planner:
-        """The runner of the policy."""
-        return runner_of(self.policy, Assistants(**self.options))
+        """The runner of the policy; who trains a class trusts it."""
+        return runner_of(self.policy, Assistants(), trust=True)
 
 
 @dataclass(frozen=True)
 class Validation:
-    """Missions that are flown for a training.
+    """Who works for a training.
 
     Attributes:
-        workers: Who flies.
+        workers: Who flies and learns.
         store: Keeps the flights, so that none is repeated; None: they are not kept.
     """
 
     workers: Workers = field(default_factory=Workers)
     store: Store[Row] | None = None
 
-    def fly(
-        self,
-        spec: PlannerSpec,
-        scenarios: Sequence[Scenario],
-        *,
-        safety_filter: bool | None = None,
-        return_mode: bool | None = None,
-    ) -> NDArray[np.float64]:
-        """Fly every scenario once.
+    def flown(self, entries: Sequence[Entry]) -> NDArray[np.float64]:
+        """Fly what was not flown before.
 
         Returns:
-            (missions, measures) in the order of MEASURES.
+            (flights, measures) in the order of MEASURES.
 
         Raises:
             PlannerError: One cannot be flown.
         """
-        entries = [
-            Entry(one, scenario_hash(one), spec, 0, "lpv", safety_filter, return_mode)
-            for one in scenarios
-        ]
         found = {row.key: row for row in self.store.rows()} if self.store else {}
         source = source_of(entries)
         todo = [
@@ -106,9 +96,31 @@ class Validation:
         ]
         for job, flown in self.workers.run(todo):
             found[job.key] = flown.row
-            if self.store is not None:
-                self.store.add(flown.row)
-        return np.array([_measured(found[entry.key]) for entry in entries], float)
+            self.keep([flown.row])
+        return np.array([measured(found[entry.key]) for entry in entries], float)
+
+    def keep(self, rows: Sequence[Row]) -> None:
+        """Keep flights that were not kept before."""
+        if self.store is not None:
+            for row in rows:
+                if row.key not in self.store.keys():  # noqa: SIM118  # of a store, not a mapping
+                    self.store.add(row)
+
+    def fly(
+        self,
+        spec: PlannerSpec,
+        scenarios: Sequence[Scenario],
+        *,
+        safety_filter: bool | None = None,
+        return_mode: bool | None = None,
+    ) -> NDArray[np.float64]:
+        """Fly every scenario once; see `flown`."""
+        return self.flown(
+            [
+                Entry(one, scenario_hash(one), spec, 0, "lpv", safety_filter, return_mode)
+                for one in scenarios
+            ]
+        )
 
 
 def fly(
@@ -125,14 +137,34 @@ def fly(
         (missions, measures) in the order of MEASURES.
     """
     on: dict[str, Any] = {"safety_filter": safety_filter, "return_mode": return_mode}
-    return (validation or Validation()).fly(PolicySpec.of(policy, **on), scenarios, **on)
+    return (validation or Validation()).fly(PolicySpec.of(policy), scenarios, **on)
 
 
-def _measured(row: Row) -> list[float]:
-    """One flight, in the order of MEASURES."""
+def measured(row: Row) -> list[float]:
+    """One flight, in the order of MEASURES.
+
+    Raises:
+        PlannerError: It could not be flown.
+    """
     if row.status == FAILED:
         raise PlannerError(row.reason)
     return [getattr(row, name) or 0.0 for name in _FIGURES.values()]
+
+
+def point_of(
+    results: NDArray[np.float64], steps: int, process_s: float, wall_s: float
+) -> CurvePoint:
+    """A point of a learning curve.
+
+    Args:
+        results: (missions, measures).
+        steps: Learned from.
+        process_s: Processor time of learning [s].
+        wall_s: [s].
+    """
+    means = dict(zip(MEASURES, results.mean(axis=0).tolist(), strict=True))
+    fields = {name: mean for name, mean in means.items() if name in CurvePoint.model_fields}
+    return CurvePoint(steps=steps, process_s=process_s, wall_s=wall_s, **fields)
 
 
 def score_of(results: NDArray[np.float64], scenarios: str) -> ValidationScore:

@@ -1,4 +1,4 @@
-"""Train velocities along routes: `python -m uas_coverage_agents.training.velocity_learning OUT`.
+"""Velocities along routes by imitation: `uas-coverage train learned-velocity`.
 
 `learned-route` is the expert: it builds the routes, and says in every state that the learner comes
 to which velocity its `leg_flight` would choose, after simulating eighty of them. It is more
@@ -8,23 +8,19 @@ Gordon, Bagnell 2011). In the first round the expert flies, in the second either
 Nothing here is tuned on the set `test`.
 """
 
-import argparse
 import math
-import platform
-import time
 from collections.abc import Sequence
-from importlib.metadata import version
 from itertools import pairwise, product
-from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from pydantic import Field
 from torch import nn
 
-from uas_coverage_agents.policy import Policy, PolicyDescription, load_policy, save_policy
-from uas_coverage_agents.policy.description import ScenarioFamily, Towns, Training
+from uas_coverage_agents.policy import Policy, load_policy
+from uas_coverage_agents.policy.description import ScenarioFamily, Training
 from uas_coverage_agents.policy.route_networks import RouteNetworks
 from uas_coverage_agents.route.layers import Layers, layers_of
 from uas_coverage_agents.route.leg_flight import (
@@ -43,20 +39,17 @@ from uas_coverage_agents.route.velocity_layout import (
     velocity_networks,
 )
 from uas_coverage_agents.route.velocity_runner import RouteVelocityRunner, velocity_observation
-from uas_coverage_agents.training import curve
-from uas_coverage_agents.training.checkpoint import CurvePoint
-from uas_coverage_agents.training.scenarios import town, validation_scenarios
-from uas_coverage_agents.training.score import MEASURES, fly, score_of
+from uas_coverage_agents.training.learner import SEEDS_APART, Arrays, Learned, Told
+from uas_coverage_agents.training.missions import Missions
+from uas_coverage_agents.training.settings import Count, LearnerSettings, own_settings
+from uas_coverage_agents.training.torch_state import Modules
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.autopilot.guidance import velocity_of
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.flight import Assistants, rollout
 from uas_coverage_env.flight.flight import unless_stopped
-from uas_coverage_env.scenario import Scenario, with_disturbances
-from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 
-CURVE_MISSIONS, SCORE_MISSIONS = 6, 40
 _RETREATS = [
     (0.0, 0.0),
     *product((0.2, 0.4, 0.7), np.linspace(0.0, math.tau, 16, endpoint=False).tolist()),
@@ -64,14 +57,15 @@ _RETREATS = [
 """Share of the top speed and direction of the velocities among which is chosen where it is late."""
 
 
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+
+
 class DaggerSettings(StrictModel):
     """How long is flown and learned.
 
     Attributes:
-        towns: In which is flown; each round and each training flies others.
-        levels: Of wind and wrong models that are flown in turn with still air.
-        rounds: Of flying, and of learning from all that was flown so far.
-        towns_per_round: How many.
+        missions_per_round: Flown in each round; each round and each training flies others.
         led: Share of the steps that the expert flies, in the first rounds; later ones: none.
         asked: Share of the other steps in which it is asked; neighbouring ones say much the same.
         samples: Sets of routes that are built.
@@ -86,29 +80,19 @@ class DaggerSettings(StrictModel):
         spare_m: Distance that is left then, beyond what has to be kept [m].
     """
 
-    towns: Towns = Towns(
-        first_seed=1_000_000, n_uas=(1, 6), n_waypoints=(20, 60), n_obstacles=(5, 20)
-    )
-    levels: tuple[str, ...] = ()
-    rounds: int = 6
-    towns_per_round: int = 45
-    led: tuple[float, ...] = (1.0, 0.5)
-    asked: float = 0.5
-    samples: int = 8
-    hidden: tuple[int, ...] = (104, 104)
-    epochs: int = 8
-    last_epochs: int = 40
-    batch: int = 256
-    rate: float = 2e-3
-    beta: float = 0.1
-    near_weight: float = 6.0
-    held: int = 2
+    missions_per_round: Count = 45
+    led: tuple[Share, ...] = (1.0, 0.5)
+    asked: Share = 0.5
+    samples: Count = 8
+    hidden: Annotated[tuple[Count, ...], Field(min_length=1, max_length=8)] = (104, 104)
+    epochs: Count = 8
+    last_epochs: Count = 40
+    batch: Count = 256
+    rate: Positive = 2e-3
+    beta: Positive = 0.1
+    near_weight: Annotated[float, Field(ge=0.0)] = 6.0
+    held: Count = 2
     spare_m: float = 1.5
-
-    @property
-    def family(self) -> ScenarioFamily:
-        """What is trained on."""
-        return ScenarioFamily(name="generated", towns=self.towns)
 
 
 class ExpertLabels(NamedTuple):
@@ -122,7 +106,7 @@ class DaggerRunner(RouteVelocityRunner):
     """Flies, and notes what it saw and what the expert would have flown there.
 
     Args:
-        policy: Of the interface "route-velocity".
+        learned: Of the interface "route-velocity".
         expert: Of the interface "route".
         led: Share of the steps that the expert flies.
         settings: Of routes, and how often the expert is asked in other steps.
@@ -136,12 +120,19 @@ class DaggerRunner(RouteVelocityRunner):
 
     def __init__(
         self,
-        policy: Policy,
+        learned: Learned,
         expert: Policy,
         led: float,
         settings: DaggerSettings,
         rng: np.random.Generator,
     ) -> None:
+        policy = learned.policy(
+            ScenarioFamily(name="none"),
+            Training(
+                algorithm="in training", settings={}, seed=0, steps=0, process_s=0.0, wall_s=0.0,
+                machine="",
+            ),
+        )  # fmt: skip
         super().__init__(policy, Assistants(), settings.samples)
         self._expert = _flight_of(expert)
         self._command = np.zeros(1, COMMAND_DTYPE)[0]
@@ -194,96 +185,99 @@ class DaggerRunner(RouteVelocityRunner):
         return found
 
 
-class VelocityTraining:
-    """One training: the network, its expert, and what was noted so far.
+class VelocityLearning:
+    """See `Learner`: each round flies missions, and learns from all that was noted so far.
 
     Args:
-        seed: Of network, samples and towns.
-        settings: How long is flown and learned.
+        settings: Of the training; `[learning]` is `DaggerSettings`.
+        missions: Where is flown.
+        seed: Of network, samples and draws.
+
+    Raises:
+        InputError: A setting is not for this learner.
     """
 
-    def __init__(self, seed: int, settings: DaggerSettings | None = None) -> None:
-        torch.set_num_threads(1)
+    def __init__(self, settings: LearnerSettings, missions: Missions, seed: int) -> None:
         torch.manual_seed(seed)
-        self.settings = settings or DaggerSettings()
-        self.seed, self.expert = seed, load_policy(EXPERT)
+        self._own = own_settings(settings, DaggerSettings)
+        self._rounds, self._missions = settings.rounds, missions
+        self._first = seed // SEEDS_APART * settings.rounds
         self._rng = np.random.default_rng(seed)
-        self._network = fresh_network(self.settings.hidden)
-        self._rows = torch.zeros((0, N_VELOCITY))
-        self._outputs = torch.zeros((0, OUTPUTS))
-        self._began = time.process_time(), time.monotonic()
+        self._network = fresh_network(self._own.hidden)
+        self._modules = Modules(flight=self._network)
+        self._rows = np.zeros((0, N_VELOCITY), np.float32)
+        self._outputs = np.zeros((0, OUTPUTS), np.float32)
+        self.expert = load_policy(EXPERT)
 
     @property
     def steps(self) -> int:
         """Velocities that were labelled so far."""
         return len(self._rows)
 
-    def fly_and_note(self, number: int) -> None:
-        """Fly the towns of a round, home without return mode."""
-        settings = self.settings
-        led = settings.led[number] if number < len(settings.led) else 0.0
-        runner = DaggerRunner(self.policy(), self.expert, led, settings, self._rng)
-        first = (self.seed * settings.rounds + number) * settings.towns_per_round
-        for k in range(first, first + settings.towns_per_round):
-            # without the filter, states come up in which it would have had to help
-            flight = rollout(
-                mission_of(settings, k), runner, return_mode=False, safety_filter=k % 3 == 0, seed=k
-            )
-            unless_stopped(flight)
-        rows, outputs = (np.concatenate(part) for part in zip(*runner.labels, strict=True))
-        self._rows = torch.cat([self._rows, torch.tensor(rows, dtype=torch.float32)])
-        self._outputs = torch.cat([self._outputs, torch.tensor(outputs, dtype=torch.float32)])
+    def learn(self, number: int, told: Told) -> None:
+        """Fly and note, then fit the network to all that was noted."""
+        self._fly_and_note(number)
+        self._fit(last=number == self._rounds - 1, told=told)
 
-    def fit(self, number: int) -> None:
-        """Fit the network to all that was noted, after a round."""
-        settings = self.settings
-        last = number == settings.rounds - 1
-        epochs = settings.last_epochs if last else settings.epochs
-        urgent = 0.25 * (1.0 - self._rows[:, SPARE].amin(dim=1, keepdim=True))
-        weight = 1.0 + settings.near_weight * urgent
-        optimiser = torch.optim.Adam(self._network.parameters())
-        for epoch in range(epochs):
-            optimiser.param_groups[0]["lr"] = settings.rate * (1.01 - epoch / epochs)
-            for batch in torch.randperm(len(self._rows)).split(settings.batch):
-                given = self._network(self._rows[batch])
-                errors = nn.functional.smooth_l1_loss(
-                    given, self._outputs[batch], beta=settings.beta, reduction="none"
-                )
-                optimiser.zero_grad()
-                (weight[batch] * errors).mean().backward()
-                optimiser.step()
+    def state_dict(self) -> Arrays:
+        """The network, and what was noted."""
+        noted = {"rows": self._rows, "outputs": self._outputs}
+        return {**self._modules.state_dict(), **noted}
 
-    def policy(self) -> Policy:
-        """What flies now; its orders are the expert's."""
+    def load_state_dict(self, state: Arrays) -> None:
+        """See `Learner`."""
+        self._modules.load_state_dict(state)
+        self._rows, self._outputs = state["rows"], state["outputs"]
+
+    def learned(self) -> Learned:
+        """The network; its orders are the expert's."""
         modules = [module for module in self._network if isinstance(module, nn.Linear)]
         tensors = {n: t for n, t in self.expert.tensors.items() if not n.startswith("flight.")}
         for k, module in enumerate(modules):
             for part in ("weight", "bias"):
                 array = getattr(module, part).detach().numpy().astype(np.float64)
                 tensors[f"flight.layers.{k}.{part}"] = array
-        description = PolicyDescription(
-            interface="route-velocity",
-            network=velocity_networks(_networks_of(self.expert).order, self.settings.hidden),
-            observation=velocity_observation(),
-            scenarios=self.settings.family,
-            training=Training(
-                algorithm="DAgger, taught by learned-route",
-                settings=self.settings.model_dump(mode="json"),
-                seed=self.seed,
-                steps=self.steps,
-                process_s=round(time.process_time() - self._began[0], 1),
-                wall_s=round(time.monotonic() - self._began[1], 1),
-                machine=f"{platform.machine()}, {platform.system()}",
-            ),
-            versions={name: version(name) for name in ("numpy", "torch")},
-        )
-        return Policy(description, tensors)
+        network = velocity_networks(_networks_of(self.expert).order, self._own.hidden)
+        return Learned("route-velocity", network, velocity_observation(), tensors)
 
+    def _fly_and_note(self, number: int) -> None:
+        """Fly the missions of a round, home without return mode."""
+        own = self._own
+        led = own.led[number] if number < len(own.led) else 0.0
+        runner = DaggerRunner(self.learned(), self.expert, led, own, self._rng)
+        first = (self._first + number) * own.missions_per_round
+        for k in range(first, first + own.missions_per_round):
+            # without the filter, states come up in which it would have had to help
+            flight = rollout(
+                self._missions.mission(k), runner, return_mode=False, safety_filter=k % 3 == 0,
+                seed=k,
+            )  # fmt: skip
+            unless_stopped(flight)
+        rows, outputs = (np.concatenate(part) for part in zip(*runner.labels, strict=True))
+        self._rows = np.concatenate([self._rows, rows.astype(np.float32)])
+        self._outputs = np.concatenate([self._outputs, outputs.astype(np.float32)])
 
-def mission_of(settings: DaggerSettings, number: int) -> Scenario:
-    """A town to fly in, in still air or at one of the levels, which take turns."""
-    level = (None, *settings.levels)[number % (1 + len(settings.levels))]
-    return with_disturbances(town(settings.towns, number), level, number)
+    def _fit(self, *, last: bool, told: Told) -> None:
+        """Fit the network to all that was noted."""
+        own = self._own
+        epochs = own.last_epochs if last else own.epochs
+        rows, outputs = torch.from_numpy(self._rows), torch.from_numpy(self._outputs)
+        urgent = 0.25 * (1.0 - rows[:, SPARE].amin(dim=1, keepdim=True))
+        weight = 1.0 + own.near_weight * urgent
+        optimiser = torch.optim.Adam(self._network.parameters())
+        for epoch in range(epochs):
+            optimiser.param_groups[0]["lr"] = own.rate * (1.01 - epoch / epochs)
+            losses = []
+            for batch in torch.randperm(len(rows)).split(own.batch):
+                errors = nn.functional.smooth_l1_loss(
+                    self._network(rows[batch]), outputs[batch], beta=own.beta, reduction="none"
+                )
+                optimiser.zero_grad()
+                loss = (weight[batch] * errors).mean()
+                loss.backward()
+                optimiser.step()
+                losses.append(loss.item())
+            told.add(self.steps, loss=float(np.mean(losses)))
 
 
 def fresh_network(hidden: tuple[int, ...]) -> nn.Sequential:
@@ -298,18 +292,6 @@ def fresh_network(hidden: tuple[int, ...]) -> nn.Sequential:
     return nn.Sequential(*layers, last)
 
 
-def point_of(policy: Policy, towns: Sequence[Scenario]) -> CurvePoint:
-    """How a policy flies some towns, with both assistants."""
-    means = dict(zip(MEASURES, fly(policy, towns).mean(axis=0).tolist(), strict=True))
-    training = policy.description.training
-    return CurvePoint(
-        steps=training.steps,
-        process_s=training.process_s,
-        wall_s=training.wall_s,
-        **{name: mean for name, mean in means.items() if name in CurvePoint.model_fields},
-    )
-
-
 def _networks_of(policy: Policy) -> RouteNetworks:
     network = policy.description.network
     if not isinstance(network, RouteNetworks):
@@ -319,42 +301,3 @@ def _networks_of(policy: Policy) -> RouteNetworks:
 
 def _flight_of(expert: Policy) -> Layers:
     return layers_of(_networks_of(expert).flight, expert.tensors, "flight.")
-
-
-def train(training: VelocityTraining, directory: Path, missions: int) -> None:
-    """Fly, learn, and again; leaves `policy/`, `learning_curve.csv` and `.png` in the directory."""
-    directory.mkdir(parents=True, exist_ok=True)
-    unseen = validation_scenarios(training.settings.family, max(missions, CURVE_MISSIONS))
-    points = [point_of(training.policy(), unseen[:CURVE_MISSIONS])]
-    for number in range(training.settings.rounds):
-        training.fly_and_note(number)
-        training.fit(number)
-        points.append(point_of(training.policy(), unseen[:CURVE_MISSIONS]))
-        curve.write(points, directory)
-        print(f"round {number + 1} of {training.settings.rounds}: {points[-1]}", flush=True)
-    policy = training.policy()
-    scored = score_of(fly(policy, unseen[:missions]), "generated, validation")
-    described = policy.description.model_copy(update={"score": scored})
-    save_policy(directory / "policy", described, policy.tensors)
-
-
-def run_script(argv: Sequence[str] | None = None) -> None:
-    """Train, score and save."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--missions", type=int, default=SCORE_MISSIONS, help="it is scored on")
-    parser.add_argument(
-        "--levels",
-        nargs="*",
-        default=[],
-        choices=list(DISTURBANCE_LEVELS),
-        help="of wind, beside still air",
-    )
-    asked = parser.parse_args(argv)
-    settings = DaggerSettings(levels=tuple(asked.levels))
-    train(VelocityTraining(asked.seed, settings), asked.out, asked.missions)
-
-
-if __name__ == "__main__":
-    run_script()

@@ -11,5 +11,7 @@ SHIPPED = Path(__file__).parents[1] / "shipped" / "learned-velocity"
 class LearnedVelocity(PolicyPlanner):
     """Plans the routes of the fleet; one trained network commands the velocity of each UAS."""
 
+    Options = AssistedOptions
+
     def __init__(self, options: AssistedOptions | None = None) -> None:
         super().__init__(options, SHIPPED)

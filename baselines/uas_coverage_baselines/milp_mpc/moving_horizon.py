@@ -15,7 +15,6 @@ from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, s
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.fallback.route_following import RouteFollower, Sent
-from uas_coverage_baselines.milp_mpc.in_wind import InWind
 from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named, checked
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
@@ -104,9 +103,6 @@ class MovingHorizon(ABC, Generic[Chosen]):
         refuse_what_asks(brief)
         self.dt_s = brief.dt_s
         stated = brief.conditions is not None
-        self._in_wind: InWind | None = None
-        if stated and self.options.in_wind == "tube":
-            self._in_wind = InWind(brief)
         self._steering: Steering | None = None
         if stated and self.options.in_wind == "guidance":
             self._steering = Steering(brief, self.options, seed)
@@ -121,8 +117,6 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:
         """Decide for every active UAS: one step of Algorithm 1."""
-        if self._in_wind is not None:
-            swarm = self._in_wind.see(swarm)
         if not swarm.active:
             return {}
         if self._steering is not None:
@@ -135,9 +129,6 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self._called &= set(swarm.active)  # with a fresh pack it need not fly home
         if any(plan and set(problem.names) - set(plan.names) for plan in (self.plan, self._backup)):
             self.plan = self._backup = None  # one that is back has a part in neither
-        if self._in_wind is not None:
-            self.plan = self._in_wind.from_here(self.plan, problem)
-            self._backup = self._in_wind.from_here(self._backup, problem)
         overruled = self._overruled(problem, swarm)
         found = decide(
             problem,
@@ -175,8 +166,6 @@ class MovingHorizon(ABC, Generic[Chosen]):
         gap = None if reason else plan.relative_gap()
         late = Reason.CUT_SHORT if plan.cut_short else None
         self.last_decision = Decision(paths, reason is not None, gap, reason or late)
-        if self._in_wind is not None:
-            return self._in_wind.velocities(plan, swarm, self._announced)
         return first_inputs(plan, swarm, self._announced)
 
     def _overruled(

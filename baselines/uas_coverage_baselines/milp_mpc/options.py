@@ -41,6 +41,15 @@ TimeLimitS = Annotated[float | None, BeforeValidator(_endless)]
 """A limit as it is typed: seconds, or none."""
 
 
+_GONE = {
+    "deterministic": "every flight repeats unless time_limit_s is given, so leave it out",
+    "moving_acceleration_mps2": "a larger moving_margin_m keeps away from what may set off",
+    "moving_speed_mps": "a larger moving_margin_m keeps away from what may set off",
+    "in_wind=tube": "give in_wind=guidance, which takes less and keeps as much",
+}
+"""Options and values of earlier versions -> what follows them."""
+
+
 class OcpOptions(PlannerOptions):
     """What the OCP of every MILP-MPC takes; the defaults are the paper's table and our tuning."""
 
@@ -50,21 +59,10 @@ class OcpOptions(PlannerOptions):
     waypoint_sides: int = Field(default=4, ge=4, le=16, multiple_of=4, description="H_WP")
     margin_m: MarginM = 0.3
     moving_margin_m: MovingMarginM = 3.0
-    moving_acceleration_mps2: float = Field(
-        default=0.0,
-        ge=0.0,
-        le=50.0,
-        description="assumed acceleration of moving obstacles towards a UAS; widens the margin; "
-        "0: none",
-    )
-    moving_speed_mps: float = Field(
-        default=15.0, gt=0.0, le=100.0, description="speed up to which they may accelerate"
-    )
-    in_wind: Literal["guidance", "tube", "wrenches"] = Field(
+    in_wind: Literal["guidance", "wrenches"] = Field(
         default="guidance",
         description="how to fly where bounds of wind or vehicles are stated: along the order by "
-        "the world's guidance; by tube MPC (clearances grow along the horizon, velocities are "
-        "commanded); or by plans as in still air",
+        "the world's guidance, or by plans as in still air",
     )
     blocks: Annotated[tuple[str, ...], BeforeValidator(_split)] = Field(
         default=(),
@@ -82,6 +80,16 @@ class OcpOptions(PlannerOptions):
         """The cost coefficients; those that are no option have their default."""
         named = {one.name: getattr(self, f"weight_{one.name}", None) for one in fields(Weights)}
         return Weights(**{name: value for name, value in named.items() if value is not None})
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gone(cls, given: Any) -> Any:
+        if isinstance(given, dict):
+            for key, value in given.items():
+                why = _GONE.get(key) or _GONE.get(f"{key}={value}")
+                if why:
+                    raise ValueError(f"{key} = {value!r}: it went after version 0.3.0; {why}")
+        return given
 
     @field_validator("solver")
     @classmethod
@@ -136,15 +144,6 @@ class MovingHorizonOptions(OcpOptions):
         le=64,
         description="most UAS planned in one decision; the others continue with their plans",
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _no_clock(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "deterministic" in given:
-            raise ValueError(
-                "deterministic went: every flight is, unless time_limit_s is given; leave it out"
-            )
-        return given
 
     @property
     def form(self) -> dict[str, Any]:

@@ -60,9 +60,7 @@ class PaperOptions(ModeOptions):
     )
     threads: int = Field(default=1, ge=1, le=64, description="of the solver")
     horizon: int = Field(default=18, ge=2, le=60, description="N, steps of the prediction")
-    in_wind: Literal["guidance", "tube", "wrenches"] = with_default(
-        ModeOptions, "in_wind", "wrenches"
-    )
+    in_wind: Literal["guidance", "wrenches"] = with_default(ModeOptions, "in_wind", "wrenches")
     order: int = Field(default=4, ge=2, le=8, description="N_dis of the Taylor series")
     physical_sides: int = Field(
         default=8, ge=4, le=64, multiple_of=4, description="H_P of the physical constraints"

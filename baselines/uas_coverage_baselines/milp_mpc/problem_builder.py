@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.getaway import getaway_margin_m
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
     seconds_onward,
     straight_seconds_home,
@@ -28,7 +27,6 @@ from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.mission import MissionBrief, Ways, WorldView
 from uas_coverage_env.mission.ways import Way
 from uas_coverage_env.planning.reserves import BRAKING_S
-from uas_coverage_env.scenario import Uas
 from uas_coverage_env.vehicle import VehicleParams, linear_model
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import dod_per_s
@@ -64,8 +62,6 @@ class ProblemBuilder:
         factor = inner_factor(options.waypoint_sides, 3)
         self._waypoint_reach_m = np.array([w.radius_m * factor for w in brief.waypoints])
         self._waypoint_weight = np.array([w.weight for w in brief.waypoints], float)
-        self._getaway_m = self._getaway_margins()
-        self._has_tube = options.in_wind == "tube" and brief.conditions is not None
 
     def vehicle(self, name: str) -> VehicleParams:
         """Parameters of a UAS's vehicle."""
@@ -132,8 +128,7 @@ class ProblemBuilder:
         # its faces are `up` of the radius away, its upright edges `level` of it
         up = inner_factor(self._options.waypoint_sides, 3)
         level = inner_factor(self._options.waypoint_sides, 2)
-        margin_m = float(self._getaway_m.min()) if len(self._getaway_m) else 0.0
-        return set(np.flatnonzero(self._view.blocked(level, up, margin_m)).tolist())
+        return set(np.flatnonzero(self._view.blocked(level, up, 0.0)).tolist())
 
     def problem(
         self,
@@ -205,9 +200,7 @@ class ProblemBuilder:
             obstacles=tuple(self._obstacles[o] for o in obstacles),
             obstacle_clearance_m=radius[:, None] + fixed + options.margin_m,
             moving=self._predicted(swarm),
-            moving_clearance_m=radius[:, None]
-            + moving
-            + np.maximum(options.moving_margin_m, self._getaway_m),
+            moving_clearance_m=radius[:, None] + moving + options.moving_margin_m,
             separation_m=(
                 radius[:, None] + radius + self.brief.uas_safe_distance_m + options.margin_m
             ),
@@ -217,23 +210,15 @@ class ProblemBuilder:
             waypoint_index=waypoints,
             n_scenario_waypoints=len(self.waypoints_m),
             home_m=np.array([self.home_m[name] for name in names]),
-            dod_max=self._dod_max(uas, x0[:, S.DOD]),
+            dod_max=np.array([u.dod_max for u in uas]),
             targets=(None,) * len(names),
             ways_home=ways_home if any(ways_home) else (),
             dt_s=self.dt_s,
             min_height_m=least_m + margin_m if least_m else 0.0,
             landing_zone_m=self.brief.landing_zone_m - margin_m,
             weights=weights,
-            tube_m=self._view.arena.tube_m[rows] if self._has_tube else None,
             **self._form,
         )
-
-    def _dod_max(self, uas: Sequence[Uas], dod: FloatArray) -> FloatArray:
-        """(U,) where the charge ends that counts: what may not be there is held back."""
-        dod_max = np.array([u.dod_max for u in uas])
-        if not self._has_tube or self.brief.conditions is None:
-            return dod_max
-        return dod + self.brief.conditions.charge_share * (dod_max - dod)
 
     def _within_reach(self, swarm: SwarmState) -> list[int]:
         """Obstacles that some UAS could come near, within the horizon or braking after it.
@@ -243,7 +228,6 @@ class ProblemBuilder:
         if not self._form.get("prune", PlanningProblem.prune):
             return list(range(len(self.brief.obstacles)))
         near_m = max(u.radius_m for u in self.brief.uas) + self._options.margin_m
-        near_m += float(self._view.arena.tube_m.max())
         result = []
         rows = [swarm.names.index(name) for name in swarm.active]
         speed = [self._vehicles[name].limits.v_xy_max_mps for name in swarm.active]
@@ -257,24 +241,6 @@ class ProblemBuilder:
             apart = np.linalg.norm(np.maximum(np.maximum(low - here, here - high), 0.0), axis=1)
             if (apart <= way_m + near_m + obstacle.safe_distance_m).any():
                 result.append(o)
-        return result
-
-    def _getaway_margins(self) -> FloatArray:
-        """(M,) [m] to get out of the way of each; 0 where no acceleration is assumed."""
-        options, brief = self._options, self.brief
-        result = np.zeros(len(brief.moving_obstacles))
-        if options.moving_acceleration_mps2 > 0.0:
-            for m, moving in enumerate(brief.moving_obstacles):
-                result[m] = max(
-                    getaway_margin_m(
-                        self._vehicles[uas.name],
-                        self.dt_s,
-                        moving.radius_m + moving.safe_distance_m + uas.radius_m,
-                        options.moving_acceleration_mps2,
-                        options.moving_speed_mps,
-                    )
-                    for uas in brief.uas
-                )
         return result
 
     def _predicted(self, swarm: SwarmState) -> tuple[MovingHull, ...]:

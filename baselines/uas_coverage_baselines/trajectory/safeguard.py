@@ -50,8 +50,6 @@ class Seen:
     def is_clear(self, uas: int, course: Course) -> bool:
         """Whether a course is clear of what moves; what stands was verified before."""
         path_m = course.path_m(max(len(course.u), 1))
-        if course.lands and len(path_m) < 2:
-            return True
         radius_m = self.fleet.brief.uas[uas].radius_m
         return self.movers.spare_m(path_m, radius_m, self.margin_m) >= 0.0
 

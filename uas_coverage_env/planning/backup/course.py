@@ -67,7 +67,7 @@ class Course:
         return np.ascontiguousarray(path_m)
 
 
-def braked(vehicle: np.void, course: Course, followed: int, steps: int) -> Course:
+def braked(vehicle: NDArray[np.void], course: Course, followed: int, steps: int) -> Course:
     """A course followed for some steps, then braked to a hover.
 
     Args:

@@ -7,7 +7,7 @@ waypoint next to a near one; which kinds of moves are tried is up to `SearchEffo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,10 +113,14 @@ class Routes:
         return np.concatenate([np.zeros(0, np.int64), *(w for trips in self.trips for w in trips)])
 
 
+def routes_of(routes: Sequence[NDArray[np.int64]]) -> Routes:
+    """An order to begin from, given by the route of each UAS; what it takes is not known yet."""
+    return Routes((*routes,), np.zeros(0, np.int64), np.zeros(len(routes)), np.inf)
+
+
 def empty_routes(n_uas: int) -> Routes:
     """No UAS visits anything: where a search begins."""
-    nothing = np.zeros(0, np.int64)
-    return Routes((nothing,) * n_uas, nothing, np.zeros(n_uas), np.inf)
+    return routes_of([np.zeros(0, np.int64)] * n_uas)
 
 
 def improve_routes(
@@ -180,7 +184,7 @@ class OrderSearch:
         routes[U, lengths[U] : lengths[U] + len(missing)] = missing
         lengths[U] += len(missing)
         # missing waypoints begin as left out and go where they cost least
-        self._arrays = _arrays(problem, effort.total_weight)
+        self._arrays = arrays_of(problem, effort.total_weight)
         insert_missing(
             self._arrays, routes, lengths, missing, effort.total_weight, effort.by_pieces
         )
@@ -224,7 +228,8 @@ def _left_out_s(problem: RoutingProblem, total_weight: float) -> FloatArray:
     return _LEFT_OUT_S * problem.weight + (1.0 + total_weight) * visit_s
 
 
-def _arrays(problem: RoutingProblem, total_weight: float) -> RoutingArrays:
+def arrays_of(problem: RoutingProblem, total_weight: float) -> RoutingArrays:
+    """A problem for compiled code, with what it costs to leave out waypoints."""
     uas = problem.uas
     follows = np.append(False, uas["flown_by"][1:] == uas["flown_by"][:-1])
     release_s = np.tile(problem.release_s, (problem.n_uas, 1))

@@ -199,8 +199,6 @@ class PlanningProblem:
         prune: whether reachable sets drop what cannot matter; False keeps every row and column,
             with big M from the fence alone (the oracle of the tests).
         data: what blocks of one's own read, by the name of the block, see `data_of`.
-        tube_m: (U, K) how far disturbances may lead each UAS off, horizontally, at the samples 0
-            to K - 1, and later as far as at the last of these; see `tubes`. None: nowhere.
     """
 
     names: tuple[str, ...]
@@ -238,7 +236,6 @@ class PlanningProblem:
     corners_of_all: bool = True
     prune: bool = True
     data: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    tube_m: FloatArray | None = None
 
     def __post_init__(self) -> None:
         # tilt and the way it moves a UAS are turned by a quarter against each other
@@ -307,12 +304,6 @@ class PlanningProblem:
         """(U,) one of the vehicles' limits by its field name."""
         return np.array([getattr(v.limits, name) for v in self.vehicles], float)
 
-    def tubes(self, steps: int) -> FloatArray | None:
-        """(U, steps + 1) `tube_m` for as many steps."""
-        if self.tube_m is None:
-            return None
-        return self.tube_m[:, np.minimum(np.arange(steps + 1), self.tube_m.shape[1] - 1)]
-
     def only(self, uas: int) -> PlanningProblem:
         """The same decision for one UAS, as if it were alone."""
         row = [uas]
@@ -330,7 +321,6 @@ class PlanningProblem:
             targets=(self.targets[uas],),
             tours=self.tours[uas : uas + 1],
             ways_home=self.ways_home[uas : uas + 1],
-            tube_m=None if self.tube_m is None else self.tube_m[row],
         )
 
     def torque_max_Nm(self, axis: int) -> FloatArray:

@@ -126,7 +126,6 @@ def _decision(problem: PlanningProblem) -> dict[str, Any]:
             block: {name: np.asarray(value).tolist() for name, value in own.items()}
             for block, own in problem.data.items()
         },
-        "tube_m": None if problem.tube_m is None else problem.tube_m.tolist(),
     }
 
 
@@ -171,8 +170,7 @@ def _problem(
             else Target(np.array(target["position_m"], float), target["weight"], target["waypoint"])
             for target in row["targets"]
         ),
-        # files from before these were written: no tours, straight ways, the default weights, no
-        # tubes
+        # files from before these were written: no tours, straight ways, the default weights
         tours=tuple(None if tour is None else _read_tour(tour) for tour in row.get("tours", ())),
         ways_home=tuple(
             None if way is None else WayHome(np.array(way["corner_m"], float), way["onward_s"])
@@ -183,7 +181,6 @@ def _problem(
             block: {name: np.array(value) for name, value in own.items()}
             for block, own in row.get("data", {}).items()
         },
-        tube_m=None if row.get("tube_m") is None else np.array(row["tube_m"], float),
         **fields,
     )
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_baselines.milp_mpc.model.tightening import across, kept
 from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
 from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
 
@@ -47,26 +46,19 @@ def _trouble_alone(problem: PlanningProblem, row: int, path: FloatArray) -> str 
     name = problem.names[row]
     if np.abs(path[0] - problem.x0[row, :3]).max() > _START_M:
         return f"{name} is not where its plan begins"
-    fence, tube_m = problem.fence, problem.tubes(len(path) - 1)
-    tube_m = np.zeros(len(path)) if tube_m is None else tube_m[row]
-    beyond = fence.face_distances(path) + problem.fence_margin_m
-    kept_m = [kept(tube_m[None], room[None])[0] for room in -beyond[0]]
-    outside = (beyond + np.transpose(kept_m) * across(fence.normals))[1:].max()
+    outside = (problem.fence.face_distances(path) + problem.fence_margin_m)[1:].max()
     if outside > _TOLERANCE_M:
         return f"{name} leaves the fence's margin by {outside:.3g} m"
     if problem.min_height_m and (low := too_low_m(problem, row, path).max()) > _TOLERANCE_M:
         return f"{name} is {low:.3g} m below the least height"
     clearances = problem.obstacle_clearance_m[row] - _TOLERANCE_M
     # an obstacle one of whose faces separates the whole path needs no look at the segments
-    near = np.flatnonzero(problem.hulls.apart_m(path) < clearances + tube_m[-1])
+    near = np.flatnonzero(problem.hulls.apart_m(path) < clearances)
     for o in near:
         obstacle, hull = problem.obstacles[o]
         at_start = float(hull.signed_distance(path[0])) - _TOLERANCE_M
-        spare_m = np.array([at_start - clearances[o]])
-        room_m, level = kept(tube_m[None], spare_m)[0], across(hull.normals)
         for step, (p, q) in enumerate(pairwise(path)):
-            offsets_m = hull.offsets_m - room_m[step + 1] * level
-            d = segment_clearance(hull.normals, offsets_m, 0, hull.n_faces, *p, *q)
+            d = segment_clearance(hull.normals, hull.offsets_m, 0, hull.n_faces, *p, *q)
             if d < (clearances[o] if step else min(clearances[o], at_start)):
                 return f"{name} comes within {d:.3g} m of {obstacle}"
     for m, moving in enumerate(problem.moving):

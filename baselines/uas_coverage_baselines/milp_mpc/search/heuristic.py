@@ -196,9 +196,6 @@ def _keep_out(problem: PlanningProblem, uas: int) -> _KeepOut:
     first = np.concatenate([last - counts, [last[-1] if len(last) else 0]]).astype(np.int64)
     last = np.concatenate([last, [len(offsets)]]).astype(np.int64)
     clearance = np.concatenate([problem.obstacle_clearance_m[uas], [problem.fence_margin_m]])
-    tube_m = problem.tubes(_ROOF_LOOKAHEAD)
-    if tube_m is not None:
-        clearance += tube_m[uas, -1]
     ground = problem.min_height_m, problem.home_m[uas], problem.landing_zone_m
     return _KeepOut(normals, offsets, first, last, clearance, *ground)
 

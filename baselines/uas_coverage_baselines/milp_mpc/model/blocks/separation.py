@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
-from uas_coverage_baselines.milp_mpc.model.tightening import across, kept
 from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
 
 FloatArray = NDArray[np.float64]
@@ -231,15 +230,6 @@ def from_obstacles(problem: PlanningProblem) -> Iterator[Separation]:
     lowest = offsets - problem.reach.support(-normals)
     highest = offsets + problem.reach.support(normals)
     offsets = np.broadcast_to(offsets, lowest.shape)
-    tube_m = problem.tubes(problem.horizon)
-    if tube_m is not None:
-        spare_m = np.maximum.reduceat(lowest[:, 0] - clearance, ends - faces, axis=1)
-        margin_m = [
-            np.repeat(kept(tube_m, room)[:, :, None], n, axis=2)
-            for room, n in zip(spare_m.T, faces, strict=True)
-        ]
-        shift_m = np.concatenate(margin_m, axis=2) * across(normals)
-        offsets, lowest, highest = offsets - shift_m, lowest - shift_m, highest - shift_m
     separates = (lowest >= clearance[:, None]).all(axis=1)
     far = np.logical_or.reduceat(separates, ends - faces, axis=1).all(axis=0) & problem.prune
     swarm = np.arange(problem.n_uas)
@@ -263,16 +253,12 @@ def from_moving_obstacles(problem: PlanningProblem) -> Iterator[Separation]:
     faces = closed_cylinder_faces(problem.obstacle_sides)
     swarm = np.arange(problem.n_uas)
     highest, lowest = problem.reach.support(faces), -problem.reach.support(-faces)
-    tube_m = problem.tubes(problem.horizon)
     for row, moving in enumerate(problem.moving):
         offset = -(moving.position_m @ faces.T)
         offset = np.broadcast_to(offset, (problem.n_uas, *offset.shape))
         size = np.full(len(faces), moving.radius_m)
         size[-2:] = moving.half_height_m
         clearance = size + problem.moving_clearance_m[:, [row]]
-        if tube_m is not None:
-            spare_m = (lowest[:, 0] + offset[:, 0] - clearance).max(axis=1)
-            offset = offset - kept(tube_m, spare_m)[:, :, None] * across(faces)
         yield Separation(
             moving.name,
             faces,
@@ -297,11 +283,6 @@ def from_each_other(problem: PlanningProblem) -> Iterator[Separation]:
     clearance = np.repeat(problem.separation_m[first, second][:, None], len(faces), axis=1)
     lowest, highest = -(behind[first] + ahead[second]), ahead[first] + behind[second]
     offset = np.zeros(lowest.shape)
-    tube_m = problem.tubes(problem.horizon)
-    if tube_m is not None:
-        spare_m = (lowest[:, 0] - clearance).max(axis=1)
-        shift_m = kept(tube_m[first] + tube_m[second], spare_m)[:, :, None] * across(faces)
-        offset, lowest, highest = offset - shift_m, lowest - shift_m, highest - shift_m
     yield Separation(
         "collision",
         faces,

@@ -1,1 +1,0 @@
-"""Reference learners for the levels: known libraries, with settings as data (`learners/`)."""
