@@ -1,6 +1,7 @@
-"""Learners of libraries and of one's own: trained in rounds, put aside, flown; no edit here."""
+"""Learners of libraries and of one's own: trained in rounds, put aside and flown."""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -130,7 +131,7 @@ def curve_without_picture(monkeypatch):
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch) -> Path:
+def own(tmp_path, monkeypatch) -> Iterator[Path]:
     """A folder with a file of one's own, in which the program is called."""
     (tmp_path / "my_learners.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
@@ -223,9 +224,7 @@ def test_a_buffer_and_a_network_of_ones_own_are_named_in_the_settings(own):
     policy = trained(tiny("ppo", *changes), own / "run")
     shapes = policy.description.network.shapes()
     assert shapes["mlp_extractor.policy_net.0.weight"][0] == 3
-    import my_learners
-
-    assert set(my_learners.Half.taken) == {8}
+    assert set(sys.modules["my_learners"].Half.taken) == {8}
     assert load_planner(f"policy:{own / 'run' / 'policy'}", {"trust": "true"})
 
 

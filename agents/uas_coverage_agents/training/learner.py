@@ -105,7 +105,7 @@ class Learner(Protocol):
         """What is known between two rounds; plain arrays."""
         ...
 
-    def load_state_dict(self, state: Arrays) -> None:
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Know it again.
 
         Raises:
