@@ -353,12 +353,13 @@ def test_a_uas_that_may_not_fly_gets_nothing():
     assert sorted(found.routes[0]) == list(range(10))
 
 
-def test_a_lost_uass_waypoints_go_to_the_others():
+@pytest.mark.parametrize("moves", [0, 20_000])
+def test_a_lost_uass_waypoints_go_to_the_others(moves):
     problem = task(3, 10)
     before = improve_routes(problem, empty_routes(2), SOME, 0)
     assert len(before.routes[1])
     lost = problem.replace(budget_s=np.array([1000.0, -np.inf]), idle_s=np.zeros(2))
-    after = improve_routes(lost, before, SOME, 0)
+    after = improve_routes(lost, before, SearchEffort(moves), 0)
     assert sorted(after.routes[0]) == list(range(10))
 
 
