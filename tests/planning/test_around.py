@@ -1,6 +1,7 @@
 """What is done round every planner: one of some lines has it, too."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ class InTurn:
         self.resets += 1
         self.briefs.append(brief)
 
-    def act(self, swarm):
+    def act(self, swarm) -> Any:
         self.shown.append(swarm)
         open_ = np.flatnonzero(swarm.uncovered)
         return {name: GoTo(int(open_[0]) if len(open_) else None) for name in swarm.active}
@@ -45,7 +46,7 @@ class LooksAhead(InTurn):
 class Hovers(InTurn):
     """Stays where it is, by velocities of its own."""
 
-    def act(self, swarm):
+    def act(self, swarm) -> Any:
         return {name: Velocity(0.0, 0.0, 10.0) for name in swarm.active}
 
 
@@ -153,7 +154,11 @@ def test_a_planner_that_names_waypoints_is_flown_by_legs_where_an_autopilot_flie
 
 def test_a_planner_with_routes_is_flown_along_them_whatever_it_commands():
     class Routed(InTurn):
-        goes_to, routes = True, ([1], [])
+        goes_to = True
+
+        def __init__(self):
+            super().__init__()
+            self.routes = [[1], []]
 
         def act(self, swarm):
             self.routes = [[1] if swarm.uncovered[1] else [], []]

@@ -25,12 +25,14 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
 from uas_coverage_baselines.milp_mpc.options import ModeOptions, TimeLimitS, with_default
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
+from uas_coverage_baselines.milp_mpc.silent_uas import SilentUas
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
 from uas_coverage_baselines.milp_mpc.solvers.interface import SolverError, SolveStatus
 from uas_coverage_env.entities.commands import Mode
 from uas_coverage_env.flight import Decision
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.mission.refusal import refuse_what_asks
+from uas_coverage_env.planning.around.handover import away_of
 from uas_coverage_env.world import Command, SwarmState
 
 _ROUNDING_M = 1e-5  # a solution keeps its rows to 2e-6, and a breach is one by any amount
@@ -178,7 +180,7 @@ class MilpMpcPaper:
         """Start a mission; nothing is random in the planner, so the seed changes nothing."""
         refuse_what_asks(brief)
         self._brief = brief
-        self._by_modes = ModeProblems(brief, self.options)
+        self._by_modes, self._silent_uas = ModeProblems(brief, self.options), SilentUas(brief, 0.0)
         self.plan = self.last_decision = self.last_program = None
 
     def mode(self, name: str) -> Mode:
@@ -193,6 +195,7 @@ class MilpMpcPaper:
     def problem(self, swarm: SwarmState) -> PlanningProblem:
         """Algorithms 2 and 3, then the OCP's data."""
         problem = self._by_modes.problem(swarm, self.plan)
+        problem = self._silent_uas.beside(problem, swarm, away_of(swarm))
         return with_data(problem, self.blocks, self._brief, swarm)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:

@@ -65,7 +65,9 @@ class Supervisor:
         braking_steps: After which every braked course hovers.
     """
 
-    def __init__(self, vehicles: Sequence[NDArray[np.void]], dt_s: float) -> None:
+    def __init__(
+        self, vehicles: Sequence[NDArray[np.void]] | NDArray[np.void], dt_s: float
+    ) -> None:
         self._vehicles = vehicles
         self.braking_steps = int(np.ceil(BRAKING_S / dt_s))
         self.backups: dict[int, Course] = {}
