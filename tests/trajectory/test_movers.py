@@ -8,7 +8,12 @@ from hand_made import NOTHING, moving
 from small_fleets import fleet_of
 from small_worlds import box, meadow, mover
 from uas_coverage_baselines.trajectory.movers import NEVER, Movers
-from uas_coverage_baselines.trajectory.space import spare_of_rules_m
+from uas_coverage_baselines.trajectory.space import (
+    spare_fixed_m,
+    spare_from_body_m,
+    spare_height_m,
+    spare_of_rules_m,
+)
 
 from uas_coverage_env.planning.backup import apart_m
 from uas_coverage_env.vehicle.layout import VX, VZ
@@ -58,13 +63,22 @@ def test_of_several_the_nearest_counts():
     assert spare(NOTHING, here) == np.inf
 
 
-@pytest.mark.parametrize(("nearer_m", "kept"), [(0.002, False), (0.0, True), (-2.0, True)])
+@pytest.mark.parametrize(
+    ("nearer_m", "kept"), [(0.002, False), (5e-4, True), (0.0, True), (-2.0, True)]
+)
 @pytest.mark.parametrize("way", [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
 def test_what_is_too_near_already_is_kept_where_it_comes_no_nearer(way, nearer_m, kept):
     size_m = 4.0 if way[0] else 3.0
     start_m = np.array((50.0, 60.0, -20.0)) + np.array(way) * (size_m + 2.0)
     parked = moving(((50.0, 60.0, -20.0), STANDING))
     assert (spare(parked, start_m, start_m - nearer_m * np.array(way)) >= 0.0) == kept
+
+
+def test_what_is_too_near_already_and_comes_nearer_by_itself_is_not_kept():
+    here = (50.0, 69.0, -20.0)  # 5 m from its edge
+    coming, going = (moving(((50.0, 60.0, -20.0), (0.0, way, 0.0))) for way in (1.0, -1.0))
+    assert spare(coming, here, here) == pytest.approx(4.0 - 5.0, abs=2e-3)
+    assert spare(going, here, here) >= 0.0
 
 
 def test_paths_are_apart_as_far_as_their_nearest_moments_between_samples_too():
@@ -101,12 +115,16 @@ def test_obstacles_and_silent_uas_are_seen_with_their_sizes_and_distances():
     np.testing.assert_allclose(seen.radius_m, [4.0, 0.0])
     np.testing.assert_allclose(seen.half_height_m, [3.0, 0.0])
     np.testing.assert_allclose(seen.safe_m, [3.0, 0.36 + 5.0])
+    np.testing.assert_allclose(
+        replace(seen, dt_s=0.5).later(8).position_m, seen.later(4).position_m
+    )
     later = seen.later(4)
     np.testing.assert_allclose(later.position_m, [(64.0, 52.0, -20.0), (92.0, 28.0, -13.0)])
 
 
 def test_an_obstacle_has_turned_and_a_uas_is_off_where_they_go_otherwise():
-    before = replace(moving(((50.0, 60.0, -20.0), (1.0, 0.0, 0.0)), (STANDING,) * 2), n_obstacles=1)
+    uas = (80.0, 20.0, -9.0), (0.0, -3.0, 0.0)
+    before = replace(moving(((50.0, 60.0, -20.0), (1.0, 0.0, 0.0)), uas), n_obstacles=1)
     assert not before.later(3).has_turned(before)
     assert before.later(3).off_m(before, 3.0) == pytest.approx(0.0)
     velocities = before.velocity_mps
@@ -137,7 +155,17 @@ def test_a_waypoint_opens_when_what_moves_has_left_it_or_is_above_it():
     places = path((50.0, 60.0, -20.0), (50.0, 60.0 - away_m - 0.1, -20.0), (50.0, 60.0, -40.0))
     opens = leaving.open_from(places, np.full(3, reach_m), UAS_M, MARGIN_M)
     assert opens.tolist() == [int(away_m / 2.0) + 1, 0, 0]
+    half = replace(leaving, dt_s=0.5).open_from(places, np.full(3, reach_m), UAS_M, MARGIN_M)
+    assert half[0] in (2 * opens[0] - 1, 2 * opens[0])
+    slow = replace(leaving, velocity_mps=np.array([(0.0, 0.05, 0.0)]), dt_s=0.5)
+    assert slow.open_from(places, np.full(3, reach_m), UAS_M, MARGIN_M)[0] < NEVER
     parked = moving(((50.0, 60.0, -20.0), STANDING))
+    level_m, up_m = 4.0 + KEEP_M - 4.0, 3.0 + KEEP_M - 4.0
+    for off, is_open in ((0.05, True), (-0.05, False)):
+        aslant = (level_m + off) / np.sqrt(2.0)
+        beside = path((50.0 + aslant, 60.0 + aslant, -20.0), (50.0, 60.0, -20.0 - up_m - off))
+        opens = parked.open_from(beside, np.full(2, reach_m), UAS_M, MARGIN_M)
+        assert (opens == 0).tolist() == [is_open] * 2
     assert parked.open_from(places[:1], np.full(1, reach_m), UAS_M, MARGIN_M).tolist() == [NEVER]
     both = moving(((50.0, 60.0, -20.0), (0.0, 2.0, 0.0)), ((50.0, 60.0, -20.0), (0.0, 4.0, 0.0)))
     further_m = away_m + 2.0  # the faster one may surprise more, and is gone sooner
@@ -190,6 +218,10 @@ def test_a_path_that_begins_too_near_comes_no_nearer(space):
     for start_m, nearer_m, away_m in (
         ((98.5, 60.0, -20.0), (98.6, 60.0, -20.0), (90.0, 60.0, -20.0)),
         ((60.0, 0.3, -20.0), (60.0, 0.2, -20.0), (60.0, 9.0, -20.0)),
+        ((60.0, 199.7, -20.0), (60.0, 199.8, -20.0), (60.0, 190.0, -20.0)),
+        ((0.3, 60.0, -20.0), (0.2, 60.0, -20.0), (9.0, 60.0, -20.0)),
+        ((199.7, 60.0, -40.0), (199.8, 60.0, -40.0), (190.0, 60.0, -40.0)),
+        ((60.0, 60.0, -49.7), (60.0, 60.0, -49.8), (60.0, 60.0, -40.0)),
         ((90.0, 30.0, -3.0), (90.0, 30.0, -2.9), (90.0, 30.0, -9.0)),
     ):
         assert of_rules(space, start_m, nearer_m, away_m) == pytest.approx(-0.1)
@@ -208,3 +240,38 @@ def test_the_least_height_holds_outside_of_the_landing_zone(space):
     diagonal_m = zone_m * np.array([0.75, 0.75])
     corner = (60.0 - diagonal_m[0], 60.0 - diagonal_m[1], -4.0)
     assert of_rules(space, high, corner, high) == pytest.approx(-1.0)
+
+
+# how far a plan keeps from what stands: margins beyond the rules', by one face for each step
+
+
+def test_a_plan_keeps_its_margin_beyond_the_rules_from_both_ends_of_a_step(space):
+    far = (80.0, 60.0, -20.0)
+    for gap_m in (2.6, 1.0):
+        near = (100.0 - gap_m, 60.0, -20.0)
+        for places in ((far, near), (near, far), (far, near, far)):
+            assert spare_fixed_m(space, path(*places)) == pytest.approx(gap_m - 2.36 - 0.3)
+    assert spare_fixed_m(space, path(far, (90.0, 60.0, -20.0))) > 0.0
+    # past a corner one face has to separate both ends, though the segment is clear
+    corner = path((97.8, 21.0, -20.0), (103.0, 17.5, -20.0))
+    assert spare_fixed_m(space, corner) == pytest.approx(-1.0 - 2.66)
+    beside = path((98.0, 18.5, -20.0), (108.0, 17.8, -20.0))
+    assert spare_fixed_m(space, beside) == pytest.approx(1.5 - 2.66)
+
+
+def test_a_plan_keeps_a_body_s_distances_level_or_upright(space):
+    here, body = path((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), path((8.0, 6.0, 3.0), (8.0, 6.0, 3.0))
+    assert spare_from_body_m(here, body, 7.0, 9.0) == pytest.approx(3.0)
+    assert spare_from_body_m(here, body, 11.0, 2.0) == pytest.approx(1.0)
+    assert spare_from_body_m(here, body, 11.0, 4.0) == pytest.approx(-1.0)
+    approaching = path((20.0, 0.0, 0.0), (9.0, 0.0, 0.0), (20.0, 0.0, 0.0))
+    still = np.zeros((3, 3))
+    assert spare_from_body_m(still, approaching, 7.0, 7.0) == pytest.approx(2.0)
+    assert spare_from_body_m(still[:2], approaching[::2], 7.0, 7.0) == pytest.approx(13.0)
+
+
+def test_the_least_height_of_a_plan_leaves_out_its_ends_and_the_landing_zone(space):
+    low, high = (100.0, 100.0, -4.0), (100.0, 100.0, -9.0)
+    assert spare_height_m(space, path(low, high, low)) == pytest.approx(9.0 - 5.1)
+    assert spare_height_m(space, path(high, low, high)) == pytest.approx(4.0 - 5.1)
+    assert spare_height_m(space, path(high, (60.0, 60.0, -1.0), high)) == np.inf
