@@ -49,6 +49,7 @@ from uas_coverage_env.env.rewards.terms import rewards_table
 from uas_coverage_env.flight import Why, figures
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.leaderboard.scores import columns
+from uas_coverage_env.planning.reserves import RESERVES, Reserve
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
 
@@ -217,6 +218,16 @@ def of_operations(name: str) -> str:
     return table(*getattr(importlib.import_module("operations_tables"), name)())
 
 
+def reserves() -> str:
+    """What routes allow for, and keep of the flying time."""
+    numbers = [name for name in Reserve._fields if name not in ("of", "measured")]
+    rows = [
+        (f"`{name}`", *(f"{getattr(one, column):g}" for column in numbers), one.of, one.measured)
+        for name, one in RESERVES.items()
+    ]
+    return table(("reserve", *(f"`{name}`" for name in numbers), "of", "measured by"), rows)
+
+
 def learner_settings() -> str:
     """The keys of a file of `uas-coverage train`."""
     text = re.split(r"^Attributes:\n", inspect.getdoc(LearnerSettings) or "", flags=re.MULTILINE)[1]
@@ -252,6 +263,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "families": families_table,
     "planners": planners,
     "figures": flight_figures,
+    "reserves": reserves,
     "comparison_columns": comparison_columns,
     "learner_settings": learner_settings,
     "not_on_a_gpu": lambda: table(

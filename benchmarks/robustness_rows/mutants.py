@@ -122,7 +122,7 @@ def tried(path: str, number: int) -> Result:
     file = Path(_tree().name, path)
     with use_mutation(file, get_operator(mutant.operator_name)(), mutant.occurrence) as texts:
         caught = _failing(tests)
-    before, after = (text.split("\n") for text in texts)
+    before, after = (str(text).split("\n") for text in texts)
     (k,) = (k for k, lines in enumerate(zip(before, after, strict=True)) if len({*lines}) > 1)
     change = f"{path}:{mutant.definition_name}: `{before[k].strip()}` -> `{after[k].strip()}`"
     return {"path": path, "mutant": change, "line": k + 1, "caught": caught}
@@ -166,7 +166,8 @@ def finding(results: Mapping[str, Result]) -> Finding:
     """A mutant that no test sees has failed, unless it was read and does the same."""
     good = [one for one in results.values() if one.get("mutant")]
     equivalent = {each["mutant"]: each["why"] for each in TABLE["equivalent"]}
-    rows, said = [], []
+    rows: list[list[Any]] = []
+    said: list[str] = []
     for path in dict.fromkeys(one["path"] for one in good):
         mine = [one for one in good if one["path"] == path]
         left = [one["mutant"] for one in mine if not one["caught"]]
@@ -174,16 +175,16 @@ def finding(results: Mapping[str, Result]) -> Finding:
         rows.append([f"`{path}`", *_counted(len(mine), len(mine) - len(left), same)])
         said += [f"- the same: {each}: {equivalent[each]}" for each in left if each in equivalent]
         said += [f"- not caught: {each}" for each in left if each not in equivalent]
-    totals = [sum(int(row[k]) for row in rows) for k in range(1, 5)]
+    all_of, caught, same = (sum(int(row[k]) for row in rows) for k in range(1, 4))
     if rows:
-        rows.append(["all", *_counted(*totals[:3])])
+        rows.append(["all", *_counted(all_of, caught, same)])
     headings = ("file", "mutants", "caught", "the same", "not caught", "caught of the others")
     broken = len(errors(results))
     table = "\n".join([markdown(headings, rows), "", *said])
-    return Finding(totals[0] + broken, totals[3] + broken, table.rstrip())
+    return Finding(all_of + broken, all_of - caught - same + broken, table.rstrip())
 
 
-def _counted(mutants: int, caught: int, same: int) -> list[object]:
+def _counted(mutants: int, caught: int, same: int) -> list[Any]:
     """Cells of a line of the table."""
     others = max(mutants - same, 1)
     return [mutants, caught, same, mutants - caught - same, f"{caught / others:.0%}"]

@@ -1,6 +1,7 @@
-"""Learners of libraries and of one's own: trained in rounds, put aside, flown; no edit here."""
+"""Learners of libraries and of one's own: trained in rounds, put aside and flown."""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,11 @@ from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.training import curve
 from uas_coverage_agents.training.central_critic import CentralCriticPolicy
 from uas_coverage_agents.training.checkpoint import CHECKPOINT
-from uas_coverage_agents.training.learner import Told, learner_of
+from uas_coverage_agents.training.learner import Told
 from uas_coverage_agents.training.library import LibraryLearner
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.policy_runner import EnvironmentRunner
-from uas_coverage_agents.training.rounds import TrainingJob, TrainingProgress, train
+from uas_coverage_agents.training.rounds import TrainingJob, TrainingProgress, learner_of, train
 
 from uas_coverage_env import MissionBrief, generate_scenario, load_planner, rollout
 from uas_coverage_env.env import CoverageParallelEnv
@@ -130,7 +131,7 @@ def curve_without_picture(monkeypatch):
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch) -> Path:
+def own(tmp_path, monkeypatch) -> Iterator[Path]:
     """A folder with a file of one's own, in which the program is called."""
     (tmp_path / "my_learners.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
@@ -223,9 +224,7 @@ def test_a_buffer_and_a_network_of_ones_own_are_named_in_the_settings(own):
     policy = trained(tiny("ppo", *changes), own / "run")
     shapes = policy.description.network.shapes()
     assert shapes["mlp_extractor.policy_net.0.weight"][0] == 3
-    import my_learners
-
-    assert set(my_learners.Half.taken) == {8}
+    assert set(sys.modules["my_learners"].Half.taken) == {8}
     assert load_planner(f"policy:{own / 'run' / 'policy'}", {"trust": "true"})
 
 

@@ -1,5 +1,7 @@
 """`learned-route`: routes of the whole fleet, and flights along them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from uas_coverage_agents.policy import load_policy
@@ -28,6 +30,8 @@ from uas_coverage_env.entities.commands import COMMAND_DTYPE, VELOCITY
 from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 from uas_coverage_env.mission import MissionBrief, WorldView, first_sight
 from uas_coverage_env.mission.raised import raised
+from uas_coverage_env.planning.reserves import LEARNED_ROUTE as RESERVE
+from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.planning.routing.search import arrays_of
 from uas_coverage_env.vehicle.layout import THETA, VX, VY, X
 from uas_coverage_env.vehicle.lpv import fly_kinematics
@@ -219,3 +223,17 @@ def test_a_plan_covers_the_waypoint_behind_a_house_and_stays_clear(behind_a_hous
     assert len(path_m) <= 12
     path_m = np.array(path_m)
     assert fixed_slack(arena, 0, path_m, len(path_m) - 1, -1.0, 2.0) >= 0.0
+
+
+def test_the_way_home_from_here_has_its_landing_but_of_a_uas_that_has_not_set_off(town):
+    brief = MissionBrief.of(town)
+    swarm = replace(first_sight(brief), departed=np.array([True, False]))
+    swarm.x[:, 1] += 40.0
+    works, wanted = np.ones(2, np.bool_), swarm.uncovered.copy()
+    way_s = Legs(brief).way_home_s(0, swarm.x[0, :3])
+    found = RouteProblems(brief).seen(swarm, works, wanted).uas["idle_s"]
+    assert way_s > 2.0
+    expected_s = RESERVE.legs_share * way_s + RESERVE.landing_s
+    assert found == pytest.approx([expected_s, 0.0])
+    only = RouteProblems(brief).seen(swarm, np.array([False, True]), wanted)
+    assert not only.uas["idle_s"].any()

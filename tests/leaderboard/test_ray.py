@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 from leaderboard_rows import flights_in
@@ -16,7 +15,8 @@ pytestmark = pytest.mark.slow
 
 RUN = "import sys; from uas_coverage_env.cli import main; sys.exit(main())"
 DEADLINE_S = 180.0
-TINY = str(Path(__file__).parents[1] / "agents" / "tiny.toml")
+TINY = ["--set", "rounds=1", "--steps", "32", "--set", "learning.n_steps=32",
+        "--set", "learning.batch_size=32"]  # fmt: skip
 
 # hovers slowly enough to be caught in the middle, and says on which node
 SLOW = """
@@ -54,7 +54,7 @@ COMMANDS = {
         "demonstrate",
         *(f"generated:{seed}" for seed in range(900000, 900004)),
     ],
-    "train": ["train", TINY, "--missions", "6"],
+    "train": ["train", "ppo", "--missions", "6", *TINY],
 }
 PLANNER = {"demonstrate": "--planner", "train": "--baselines"}
 FLOWN = {"compare": 6, "score": 6, "demonstrate": 4, "train": 6}

@@ -69,7 +69,12 @@ class Named(RadioRange):
     name = "RadioRange"
 
 
-class NoMapping(RadioRange):
+class NoMapping:
+    name = "NoMapping"
+
+    def add_to(self, milp, v, problem):
+        pass
+
     def data(self, brief, swarm):
         return 70.0
 

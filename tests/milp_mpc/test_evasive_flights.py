@@ -56,6 +56,16 @@ def test_a_uas_gets_out_of_the_way_and_brakes():
     assert not plan.covers.any()
 
 
+@pytest.mark.parametrize(("dt_s", "steps"), [(0.5, 48), (0.8, 30)])
+def test_a_flight_out_of_the_way_takes_as_long_at_every_step(dt_s, steps):
+    place, velocity = FROM_THE_WEST
+    problem = coming((place, dt_s * np.array(velocity)), dt_s=dt_s)
+    plan = evasion(problem, dt_s)
+    assert plan.u.shape == (1, steps, 5)
+    assert is_clear(problem, plan)
+    assert np.linalg.norm(plan.x[0, -1, VX : VZ + 1]) < 0.1
+
+
 def test_where_braking_is_clear_there_is_nothing_to_evade():
     beside = (100.0 + 4.0 + CLEARANCE_M, 40.0, -20.0), (0.0, 6.0, 0.0)
     just = [np.add(beside[0], (off_m, 0.0, 0.0)) for off_m in (0.01, -0.01)]
@@ -92,6 +102,24 @@ def test_a_uas_at_the_fence_stays_within_its_margin():
     assert plan.x[0, -1, 0] < 97.0
 
 
+@pytest.mark.parametrize(("margin_m", "moves"), [(1.49, False), (1.51, True)])
+def test_a_uas_within_the_fence_s_margin_leaves_it(margin_m, moves):
+    fence = box((0.0, 0.0, -50.0), (101.5, 200.0, 0.0))
+    plan = evasion(toy(state(HERE), fence=fence, fence_margin_m=margin_m), 1.0)
+    assert (plan is not None) == moves
+    assert plan is None or plan.x[0, -1, 0] < 99.99
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_a_uas_gets_over_or_under_what_is_wide(up):
+    place = np.add(HERE, (0.0, -150.0, 2.0 * up))  # z is down
+    problem = coming((place, (0.0, 9.0, 0.0)), radius_m=70.0, half_height_m=3.0)
+    plan = evasion(problem, 1.0)
+    assert is_clear(problem, plan)
+    assert up * (plan.x[0, -1, 2] - HERE[2]) < -2.5
+    assert np.abs(plan.x[0, -1, :2] - HERE[:2]).max() < 0.1
+
+
 def test_a_uas_does_not_go_down_below_the_least_height():
     low = (100.0, 100.0, -8.0)
     flat = np.add(low, (0.0, -60.0, -3.0)), (0.0, 6.0, 0.0)  # comes above its middle
@@ -105,14 +133,14 @@ def test_a_uas_does_not_go_down_below_the_least_height():
     assert up.x[0, 1:, 2].max() <= -8.0 + 1e-3
 
 
-def test_between_samples_nothing_passes_unseen():
-    # 30 m in a step: before and behind the UAS at the samples
-    fast = (100.0, 85.0 - 60.0, -20.0), (0.0, 30.0, 0.0)
-    problem = coming(fast, radius_m=1.0)
-    plan = evasion(problem, 1.0)
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_between_samples_nothing_passes_unseen(share):
+    # 30 m in a step: it passes the UAS in the third, before and behind it at the samples
+    fast = (100.0, 100.0 - 30.0 * (2.0 + share), -20.0), (0.0, 30.0, 0.0)
+    plan = evasion(coming(fast, radius_m=1.0), 1.0)
     assert plan is not None
-    across = np.abs(plan.x[0, 2:4, 0] - 100.0)
-    assert across.min() > 2.0
+    away = plan.x[0, 2:4, :3] - HERE
+    assert np.hypot(away[:, 0], away[:, 2]).min() > 2.0
 
 
 def test_where_no_flight_is_clear_the_one_that_comes_least_too_near_is_flown():
@@ -139,8 +167,7 @@ def test_of_two_uas_the_second_keeps_clear_of_the_way_of_the_first():
     assert is_clear(problem, plan)
     moved_m = np.linalg.norm(plan.x[:, -1, :3] - plan.x[:, 0, :3], axis=1)
     assert moved_m[0] > 2.0
-    alone = evasion(coming(first, radius_m=2.0), 1.0)
-    assert alone is not None
+    assert moved_m[1] < 0.1, "one that is not in the way stays"
 
 
 def test_two_uas_in_the_way_of_one_thing_part_without_meeting():

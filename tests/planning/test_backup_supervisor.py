@@ -245,6 +245,28 @@ def test_whatever_is_wanted_the_set_keeps_apart_and_holds_what_was_held():
             assert same(supervisor.backups[u], wanted[u] if u in follow else hover(places[u]))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_once_there_is_a_set_there_is_one_at_every_later_decision(seed):
+    draw = np.random.default_rng(seed)
+    supervisor, world = supervisor_of(3), World(wall_m=60.0, crossed_m=60.0, home_m=45.0)
+    supervisor.backups = {u: hover(place) for u, place in enumerate((HERE, BESIDE, BEYOND))}
+    followed = 0
+    for step in range(60):
+        x = {u: backup.rest(step).x[0] for u, backup in supervisor.backups.items()}
+        wanted = {}
+        for u in draw.permutation(3)[: draw.integers(0, 4)].tolist():
+            way = draw.uniform(-8.0, 8.0, 3) * (1.0, 1.0, 0.0)
+            wanted[u] = straight(x[u][:3], way, int(draw.integers(1, 15)), begin=step, lands=False)
+        followed += len(supervisor.renew(world, step, x, wanted, {}))
+        assert supervisor.backups.keys() == {0, 1, 2}
+        assert apart(supervisor)
+        for u, backup in supervisor.backups.items():
+            np.testing.assert_allclose(backup.x[0, :3], x[u][:3])
+            assert backup.x[-1, 0] <= 45.0
+            assert backup.x[:, 0].max() <= 60.0
+    assert followed > 20
+
+
 # sets that are verified as a whole
 
 

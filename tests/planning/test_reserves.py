@@ -1,5 +1,7 @@
 """What planners share: every travel-time model is documented, and arrays and kernels agree."""
 
+import ast
+import re
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +27,8 @@ MODELS = {
     for name, value in vars(module).items()
     if isinstance(value, TravelTimeModel)
 }
-DOCS = Path(__file__).parents[2] / "docs" / "range_method.md"
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs" / "range_method.md"
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -52,3 +55,37 @@ def test_the_docs_have_every_model_with_its_numbers():
                for value in model]
         for name, model in MODELS.items()
     }  # fmt: skip
+
+
+def calls_of(name):
+    """Files of the packages in which something of this name is called."""
+    for package in ("uas_coverage_env", "baselines", "agents"):
+        for path in (ROOT / package).rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            if any(
+                isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+                and node.func.id == name
+                for node in ast.walk(ast.parse(text)) if name in text
+            ):  # fmt: skip
+                yield path.relative_to(ROOT).as_posix()
+
+
+def test_what_is_kept_is_said_in_one_table_and_nowhere_else():
+    assert set(calls_of("Reserve")) == {"uas_coverage_env/planning/reserves.py"}
+
+
+def test_each_reserve_is_used_and_says_what_for_and_by_which_command_it_was_measured():
+    users = "".join(
+        path.read_text(encoding="utf-8")
+        for package in ("uas_coverage_env", "baselines", "agents")
+        for path in (ROOT / package).rglob("*.py")
+        if path.name != "reserves.py"
+    )
+    for name, reserve in reserves.RESERVES.items():
+        assert re.search(rf"\b{name}\b", users), f"{name}: no planner reads it"
+        assert reserve.of, name
+        assert reserve.kept_s >= 0.0, name
+        assert 0.0 < reserve.legs_share <= 1.0, name
+        assert 0.0 < reserve.time_share <= 1.0, name
+        for script in re.findall(r"benchmarks/\w+\.py", reserve.measured):
+            assert (ROOT / script).exists(), f"{name}: {script} is gone"

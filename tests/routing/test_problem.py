@@ -14,7 +14,9 @@ from uas_coverage_env.planning.routing.terrain import Terrain
 from uas_coverage_env.scenario import Sensor, with_disturbances
 from uas_coverage_env.vehicle.layout import DOD
 
-RESERVE = Reserve(kept_s=20.0, spare_s=7.0, landing_s=5.0, legs_share=0.9, time_share=0.8)
+RESERVE = Reserve(
+    "a test", "none", kept_s=20.0, spare_s=7.0, landing_s=5.0, legs_share=0.9, time_share=0.8
+)
 KEPT_S = 27.0
 BOTH = np.ones(2, np.bool_)
 

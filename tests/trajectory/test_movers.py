@@ -121,11 +121,11 @@ def test_an_obstacle_has_turned_and_a_uas_is_off_where_they_go_otherwise():
 
 
 def test_plans_keep_from_what_moves_for_minutes_and_from_what_is_parked_for_a_while():
-    flies, parked = ((50.0, 60.0, -20.0), (0.0, 2.0, 0.0)), ((20.0, 60.0, -20.0), STANDING)
+    flies, parked = ((50.0, 60.0, -20.0), (0.0, -2.0, 0.0)), ((20.0, 60.0, -20.0), STANDING)
     for dt_s in (1.0, 0.5):
         first, second = moving(flies, parked, dt_s=dt_s).bodies(UAS_M, MARGIN_M)
         assert (len(first.path_m), len(second.path_m)) == (400 / dt_s + 1, 25 / dt_s + 1)
-        np.testing.assert_allclose(first.path_m[-1], (50.0, 860.0, -20.0))
+        np.testing.assert_allclose(first.path_m[-1], (50.0, -740.0, -20.0))
         assert (first.level_m, first.height_m) == pytest.approx((4 + KEEP_M + 2, 3 + KEEP_M + 2))
         assert (second.level_m, second.height_m) == pytest.approx((4 + KEEP_M, 3 + KEEP_M))
 

@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracle import clearance_of_segment
 from small_worlds import box, meadow, mover
 
 from uas_coverage_env.entities.outcome import CONTACT_NAMES, OUTCOME_DTYPE
 from uas_coverage_env.entities.state import LANDED, LOST
+from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.world.contacts import (
@@ -13,6 +17,7 @@ from uas_coverage_env.world.contacts import (
     check_obstacles,
     check_separation,
     count_breaches,
+    face_between,
 )
 
 SMALL_M, LARGE_M = 0.36, 1.2
@@ -266,3 +271,15 @@ def test_of_many_obstacles_the_nearest_counts(first):
     outcome = judged(world, before_m)
     assert outcome["obstacle_clearance_m"][0] == pytest.approx(0.3)
     assert (names(outcome)[0], outcome["contact_with"][0]) == ("obstacle", first)
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_face_between_bounds_the_clearance_from_below(seed):
+    rng = np.random.default_rng(seed)
+    hull = ConvexPolytope.from_points(rng.uniform(-5.0, 5.0, (8, 3)))
+    before_m, after_m = rng.uniform(-12.0, 12.0, (2, 3))
+    bound_m = face_between(hull.normals, hull.offsets_m, 0, hull.n_faces, *before_m, *after_m)
+    faces_m = np.minimum(hull.face_distances(before_m), hull.face_distances(after_m))
+    assert bound_m == pytest.approx(faces_m.max())
+    assert bound_m <= clearance_of_segment(hull, before_m, after_m) + 1e-9

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Protocol
+from typing import Any, ClassVar, Protocol
 
 from pydantic import Field
 
@@ -86,7 +86,7 @@ class PolicyPlanner:
         InputError: The directory holds no policy that can be flown; names file and field.
     """
 
-    Options: type[AssistedOptions] = PolicyOptions
+    Options: ClassVar[Any] = PolicyOptions
     argument = "DIR"
 
     def __init__(self, options: AssistedOptions | None, argument: str | Path) -> None:

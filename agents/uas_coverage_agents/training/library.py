@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import flatdim
 from numpy.typing import NDArray
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.logger import KVWriter, Logger
@@ -68,7 +69,7 @@ class LibraryLearner:
         """Weights, optimisers, counters, and what is in a replay buffer."""
         return learned(self.model)
 
-    def load_state_dict(self, state: Arrays) -> None:
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """See `Learner`."""
         take_over(state, self.model)
 
@@ -144,8 +145,8 @@ def model_of(
             raise InputError(
                 f'critic = "full" is for policy = "MlpPolicy", not {settings.policy!r}'
             )
-        policy, shape = CentralCriticPolicy, env.observation_space.shape
-        seen = shape[0] - sum(block.size for block in full_state(*room))
+        policy = CentralCriticPolicy
+        seen = flatdim(env.observation_space) - sum(block.size for block in full_state(*room))
         given["policy_kwargs"] = {**given.get("policy_kwargs", {}), "actor_size": seen}
     try:
         with warnings.catch_warnings():
@@ -156,9 +157,8 @@ def model_of(
         raise
     except Exception as error:  # whatever a library or a user's class raises is one line
         raise InputError(
-            f"{settings.algorithm} cannot be made for the action {env.action_space}; "
-            "see [learning] "
-            f"and environment.action: {described(error)}"
+            f"{settings.algorithm} cannot be made for the action {env.action_space}; see "
+            f"[learning] and environment.action: {described(error)}"
         ) from error
 
 
@@ -179,7 +179,8 @@ class _Writer(KVWriter):
 
     def write(self, key_values: dict[str, Any], key_excluded: Any, step: int = 0) -> None:
         """See the base."""
-        numbers = {k: v for k, v in key_values.items() if isinstance(v, int | float | np.number)}
+        kinds = int, float, np.number
+        numbers = {k: float(v) for k, v in key_values.items() if isinstance(v, kinds)}
         self._told.add(step, **numbers)
 
     def close(self) -> None:

@@ -53,8 +53,8 @@ class Missions:
         else:
             if settings.size:
                 raise InputError(f"[size]: {name!r} is no family; leave it out")
-            missions = None if origin else MissionSource.of(name)  # names what there is
-            made = cls(name, origin or missions.example, settings.environment)
+            # what is none of all is answered with what there is
+            made = cls(name, origin or MissionSource.of(name).example, settings.environment)
         try:
             MissionSettings.of(made.settings())
         except ValueError as error:
@@ -134,7 +134,7 @@ class Missions:
         return ScenarioFamily(name=self.name, towns=towns)
 
 
-def _sized(family: Family | FamilyOfSeeds, size: Mapping[str, Any]) -> Family | FamilyOfSeeds:
+def _sized(family: Family | FamilyOfSeeds, size: Mapping[Any, Any]) -> Family | FamilyOfSeeds:
     if not size:
         return family
     try:

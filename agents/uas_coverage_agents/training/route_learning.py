@@ -6,7 +6,8 @@ the flights that it then weighs. Nothing here is tuned on the set `test`.
 """
 
 import json
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -208,7 +209,7 @@ class RouteLearning:
             "beyond_s": self._samples.beyond_s,
         }
 
-    def load_state_dict(self, state: Arrays) -> None:
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """See `Learner`."""
         self._networks.load_state_dict(state)
         labels = json.loads(state["labels"].tobytes())

@@ -1,8 +1,10 @@
 """Networks of torch as plain arrays, and back."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import torch
+from numpy.typing import NDArray
 from torch import nn
 
 from uas_coverage_agents.training.learner import Arrays
@@ -27,7 +29,7 @@ class Modules:
             for name, tensor in module.state_dict().items()
         }
 
-    def load_state_dict(self, state: Arrays) -> None:
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Take them over.
 
         Raises:

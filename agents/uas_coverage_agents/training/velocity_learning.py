@@ -9,9 +9,9 @@ Nothing here is tuned on the set `test`.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise, product
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import torch
@@ -224,7 +224,7 @@ class VelocityLearning:
         noted = {"rows": self._rows, "outputs": self._outputs}
         return {**self._modules.state_dict(), **noted}
 
-    def load_state_dict(self, state: Arrays) -> None:
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
         """See `Learner`."""
         self._modules.load_state_dict(state)
         self._rows, self._outputs = state["rows"], state["outputs"]

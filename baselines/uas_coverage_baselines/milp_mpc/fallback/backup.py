@@ -126,8 +126,6 @@ def _joined(
 
 def still_holds(problem: PlanningProblem, backup: Plan, blocks: Sequence[Block] = OCP) -> bool:
     """Whether what is left of a backup trajectory is clear of what is seen, from where each is."""
-    if any(name not in backup.names for name in problem.names):
-        return False
     longer = replace(problem, moving=prolonged(problem, backup.u.shape[1]))
     return trouble(longer, backup, blocks) is None
 

@@ -169,7 +169,7 @@ class TeamSearch:
                 for uas, flight in tasks[first : first + _WAVE]
                 if self.work < (enough if self._plans[uas] else most)
             ]
-            solved = side_by_side.map(lambda task: self._refined(*task, neighbourhood), due)
+            solved = side_by_side.map(lambda t: self._refined(t[0], t[1], neighbourhood), due)
             for (uas, _), solution in zip(due, solved, strict=True):
                 self._collect(uas, solution)
 
@@ -294,16 +294,16 @@ class TeamSearch:
         """What the solver says; None where it fails, which ends no flight, or the time is up."""
         lower, upper = (None, None) if bounds is None else bounds
         left_s = self._time_left_s()
-        if left_s is not None:
-            if left_s < _WORTH_STARTING_S:
-                self.cut_short = True
-                return None
+        if left_s < _WORTH_STARTING_S:
+            self.cut_short = True
+            return None
+        if left_s < np.inf:
             limits = replace(limits, time_s=left_s)
         try:
             solution = self._solve(program.built, limits, start=start, lower=lower, upper=upper)
         except SolverError:
             return None
-        self.cut_short |= self._time_left_s() is not None and self._time_left_s() <= 0.0
+        self.cut_short |= self._time_left_s() <= 0.0
         return solution
 
     def _offer(self, plan: Plan) -> None:
@@ -317,10 +317,10 @@ class TeamSearch:
         """Nodes of a program, in proportion to the effort."""
         return max(round(usually * self.effort.work), 1)
 
-    def _time_left_s(self) -> float | None:
-        """Until the decision's time is up, less what is kept for afterwards; None: no limit."""
+    def _time_left_s(self) -> float:
+        """Until the decision's time is up, less what is kept for afterwards; inf: no limit."""
         if self.effort.time_limit_s is None:
-            return None
+            return np.inf
         limit_s = (1.0 - _LATE) * self.effort.time_limit_s
         return limit_s - (time.perf_counter() - self._began)
 

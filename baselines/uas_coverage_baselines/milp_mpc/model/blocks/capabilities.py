@@ -20,6 +20,14 @@ class Capabilities:
     what the world allows; everything else by intervals. The thrust
     correction Delta T is bounded below by the same piecewise-linear form the world computes it
     with, and is driven onto that bound by its cost through the depth of discharge.
+
+    | symbol | meaning | attribute |
+    | --- | --- | --- |
+    | X | limits of states | `problem.limit(NAME)`: `vehicle.limits` |
+    | U | limits of inputs | likewise, `problem.torque_max_Nm` |
+    | H_P, c_in | polygons of the norms | `problem.limit_sides`, `problem.norm_bounds` |
+    | Delta T | thrust correction f_T, Sec. II | `v.u[..., DELTA_THRUST]`, columns `thrust.*` |
+    | C, D, F | battery's outputs | `problem.models` |
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:

@@ -11,6 +11,12 @@ class Collision:
     """|p_i(n) - p_j(n)| >= delta_C,min for every pair (Sec. III-C.2), as a closed cylinder.
 
     Via eq. (const_Vec_lb): far enough horizontally beyond one of H_O faces, or vertically.
+
+    | symbol | meaning | attribute |
+    | --- | --- | --- |
+    | delta_C,min | smallest distance of a pair | `problem.separation_m` (U, U) |
+    | b_h(n) | 1: face h does not separate the pair | columns `collision.relaxed` |
+    | H_O | sides of the closed cylinder | `problem.obstacle_sides` |
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:

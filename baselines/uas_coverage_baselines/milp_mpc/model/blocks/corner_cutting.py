@@ -24,6 +24,12 @@ class CornerCutting:
     Two exact reductions: the sum row is written as b(n) <= c(n) and b(n+1) <= c(n), which says
     the same of whole numbers and cuts off fractions; and b need not be whole where c is, because
     c_h(n) = 0 for one face h forces b_h to 0 at both ends, which is all that b is asked for.
+
+    | symbol | meaning | attribute |
+    | --- | --- | --- |
+    | b_O(n) | 1: face h does not separate at sample n | columns `OBSTACLE.relaxed` |
+    | c_O(n) | 1: face h does not separate at both ends | columns `OBSTACLE.crossed` |
+    | N_FO | what has these rows | all, or fixed ones: `problem.corners_of_all` |
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:

@@ -75,6 +75,15 @@ class Coverage:
     Sec. III-C.5, via eq. (const_Vec_ub) with an H_WP-sided sphere approximated from inside, so that
     what the plan counts as covered is covered in the world. b_W is `covers`, Phi is `uncovered`;
     the row sum of b_W <= Phi follows from Phi(n+1) >= 0. Phi takes whole numbers because b_W does.
+
+    | symbol | meaning | attribute |
+    | --- | --- | --- |
+    | p^w | waypoints considered | `problem.waypoints_m` (W, 3) |
+    | delta_WP | radius, times c_in | `problem.waypoint_reach_m` (W,) |
+    | b_W(n) | 1: the UAS covers w at step n = 0..N-1 | `v.covers` (U, N, W) |
+    | Phi(n) | 1: w is open at sample n | `v.uncovered` (N+1, W) |
+    | W_Phi | cost of an open waypoint and step | `problem.waypoint_weight` (W,) |
+    | H_WP | sides of the sphere | `problem.waypoint_sides` |
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:

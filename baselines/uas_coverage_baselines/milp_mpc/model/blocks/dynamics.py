@@ -12,6 +12,12 @@ class Dynamics:
     """x(n+1) = A x(n) + B u(n) + E with x(0) measured (Sec. III-C.1, eq. (OCP_1)).
 
     The matrices are those of the measured depth of discharge, held over the horizon.
+
+    | symbol | meaning | attribute |
+    | --- | --- | --- |
+    | A_d, B_d, E_d | model of the measured depth of discharge | `problem.models`: `A`, `B`, `E` |
+    | x(n), u(n) | predicted states, inputs | `v.x` (U, N+1, 14), `v.u` (U, N, 5) |
+    | x_0 | measured state | `problem.x0`, bounds of `v.x[:, 0]` |
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:

@@ -12,6 +12,13 @@ class MovingObstacles:
 
     Via eq. (const_Vec_lb) with an H_O-sided cylinder: the polygon's faces touch the circle, so
     beyond one of them is beyond the circle.
+
+    | symbol | meaning | attribute |
+    | --- | --- | --- |
+    | p_o(n) | predicted centre | `problem.moving`: `position_m` (N+1, 3) |
+    | delta_O,min | smallest distance of a UAS | `problem.moving_clearance_m` (U, M) |
+    | b_O(n) | 1: face h does not separate UAS and obstacle | columns `OBSTACLE.relaxed` |
+    | H_O | sides of the closed cylinder | `problem.obstacle_sides` |
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:

@@ -14,6 +14,12 @@ class Slack:
 
     Penalised are |L|, |tau|, |omega|, |psi| and DoD (which is its own absolute value), each
     normalised by its largest value; DoD by what a step of hovering takes.
+
+    | symbol | meaning | attribute |
+    | --- | --- | --- |
+    | x_s, u_s | slack variables of absolute values | columns `slack.NAME` |
+    | W_u, W_x | cost coefficients | `problem.weights`: all but `climb` |
+    | | ours, 0 by default: of the climb rate | `problem.weights.climb` |
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:

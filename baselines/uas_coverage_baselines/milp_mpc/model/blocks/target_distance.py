@@ -15,6 +15,14 @@ class TargetDistance:
 
     Via eq. (const_Vec_ub) with a closed cylinder. In transit c_target = M (1 - Phi_w(n)): once
     the target waypoint is covered the distance to it costs nothing more.
+
+    | symbol | meaning | attribute |
+    | --- | --- | --- |
+    | p_target | target of a UAS, None in covering mode | `problem.targets`: `position_m` |
+    | W_D, W_target | cost of a metre and step | `problem.targets`: `weight` |
+    | w | waypoint whose coverage relaxes the rows | `problem.targets`: `waypoint` |
+    | D_target(n) | distance from the target, n = 1..N | columns `target.UAS.distance` |
+    | H_P | sides of the closed cylinder | `problem.physical_sides` |
     """
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
