@@ -4,7 +4,7 @@ import pytest
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.flight.metrics import accomplished, coverage, home
-from uas_coverage_env.planning.around import Around
+from uas_coverage_env.planning.around.around import Around
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.world import GoTo, Velocity
 

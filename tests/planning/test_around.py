@@ -11,7 +11,7 @@ from uas_coverage_env import MissionBrief, rollout
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight.metrics import accomplished, coverage
 from uas_coverage_env.mission import WorldView, first_sight
-from uas_coverage_env.planning.around import Around
+from uas_coverage_env.planning.around.around import Around
 from uas_coverage_env.planning.around.handover import SILENT_S
 from uas_coverage_env.scenario import Execution, Scenario
 from uas_coverage_env.world import GoTo, Velocity

@@ -47,10 +47,10 @@ class Guarded:
         self.guard.backups.clear()
         self.guard.backups.update(backups)
 
-    def chosen(self, wanted, movers=NOTHING, step=0, staying=(), **states):
+    def chosen(self, wanted, moving=NOTHING, step=0, staying=(), **states):
         for u, course in wanted.items():
             states.setdefault(f"x{u}", course.x[0])
-        return self.guard.chosen(self.see(step, **states), wanted, movers, staying)
+        return self.guard.chosen(self.see(step, **states), wanted, moving, staying)
 
 
 def braked_for(fleet, course, followed):

@@ -1,14 +1,14 @@
 """Courses, bodies and inputs made by hand, for the tests of what is flown."""
 
 import numpy as np
-from uas_coverage_baselines.trajectory.movers import Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.trajectory.program import PlannedFlight
 
 from uas_coverage_env.planning.backup import Course
 from uas_coverage_env.vehicle.layout import DOD, N_STATES, VX, VZ
 
 NOWHERE, NONE = np.zeros((0, 3)), np.zeros(0)
-NOTHING = Movers(NOWHERE, NOWHERE, NONE, NONE, NONE, 1.0, 0)
+NOTHING = MovingObstacles(NOWHERE, NOWHERE, NONE, NONE, NONE, 1.0, 0)
 
 
 def states_along(path_m, dod=0.1):
@@ -41,13 +41,13 @@ def moving(*bodies, dt_s=1.0):
     """What moves: (position, velocity) of cylinders 8 m wide and 6 m high, to be kept 3 m from."""
     n = len(bodies)
     places, velocities = (np.array(rows, float) for rows in zip(*bodies, strict=True))
-    return Movers(places, velocities, np.full(n, 4.0), np.full(n, 3.0), np.full(n, 3.0), dt_s, n)
+    return MovingObstacles(
+        places, velocities, np.full(n, 4.0), np.full(n, 3.0), np.full(n, 3.0), dt_s, n
+    )
 
 
 def flight_of(inputs):
     """A planned flight of which nothing but the inputs (N, 3) matters."""
     inputs = np.array(inputs, float)
     n = len(inputs)
-    return PlannedFlight(
-        np.zeros(0, np.int64), np.zeros((n + 1, 10)), inputs, np.zeros((n, 10)), 0.0, np.zeros(0)
-    )
+    return PlannedFlight(np.zeros(0, np.int64), np.zeros((n + 1, 10)), inputs, 0.0, np.zeros(0))

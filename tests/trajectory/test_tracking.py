@@ -6,7 +6,7 @@ from small_fleets import every_waypoint, field, fleet_of, quickest, start_of
 from uas_coverage_baselines.trajectory.course import course_of
 from uas_coverage_baselines.trajectory.flight_model import NORMS, excess, flight_model
 from uas_coverage_baselines.trajectory.mission_plan import Planned
-from uas_coverage_baselines.trajectory.movers import Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.trajectory.steering import Failures
 from uas_coverage_baselines.trajectory.tracking import tracked
 
@@ -26,8 +26,8 @@ def under_way():
 
 
 def again_from(fleet, planned, swarm, program_of):
-    movers = Movers.seen(fleet.brief, swarm, np.zeros(1, np.bool_))
-    return tracked(fleet, 0, {0: planned}, swarm, movers, program_of)
+    moving = MovingObstacles.seen(fleet.brief, swarm, np.zeros(1, np.bool_))
+    return tracked(fleet, 0, {0: planned}, swarm, moving, program_of)
 
 
 def most_used(fleet, flight):

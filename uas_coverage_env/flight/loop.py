@@ -30,7 +30,7 @@ from uas_coverage_env.flight.planner import Assistants, Planner, check_planner
 from uas_coverage_env.flight.registry import load_planner, name_of, options_of
 from uas_coverage_env.interruptions import signals_noted
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.planning.around import Around
+from uas_coverage_env.planning.around.around import Around
 from uas_coverage_env.planning.around.relaunch import Relaunch
 from uas_coverage_env.plugins.installed import version_of
 from uas_coverage_env.plugins.users_code import described, place_of

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.trajectory.flight_model import flight_model, reduced_state
-from uas_coverage_baselines.trajectory.movers import Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.trajectory.program import (
     Allowance,
     Asked,
@@ -130,14 +130,14 @@ class Fleet:
         uas = self.brief.uas
         return uas[i].radius_m + uas[j].radius_m + self.brief.uas_safe_distance_m
 
-    def bodies(self, movers: Movers, uas: int) -> list[Body]:
+    def bodies(self, moving: MovingObstacles, uas: int) -> list[Body]:
         """What moves, as a UAS keeps clear of it."""
-        return movers.bodies(self.brief.uas[uas].radius_m, self._moving_margin_m)
+        return moving.bodies(self.brief.uas[uas].radius_m, self._moving_margin_m)
 
-    def opens(self, movers: Movers) -> IntArray:
+    def opens(self, moving: MovingObstacles) -> IntArray:
         """(W,) steps from now at which what moves lets waypoints be covered."""
         radius_m = max(uas.radius_m for uas in self.brief.uas)
-        return movers.open_from(self.waypoints_m, self.radius_m, radius_m, self._moving_margin_m)
+        return moving.open_from(self.waypoints_m, self.radius_m, radius_m, self._moving_margin_m)
 
     def battery_s(self, x: FloatArray) -> FloatArray:
         """(U,) seconds that each battery lasts at full speed, and with the worst vehicle stated."""
@@ -190,7 +190,7 @@ class Fleet:
         self,
         uas: int,
         paths_m: Mapping[int, FloatArray],
-        movers: Sequence[Body],
+        moving: Sequence[Body],
         earliest: IntArray | None = None,
     ) -> FlightProgram:
         """The program of a UAS, clear of the paths of others and of what moves."""
@@ -202,16 +202,16 @@ class Fleet:
         ]
         return replace(
             self.programs[uas],
-            bodies=(*bodies, *movers),
+            bodies=(*bodies, *moving),
             earliest=earliest,
             solved=0,
         )
 
     def tracking_program(
-        self, uas: int, paths_m: Mapping[int, FloatArray], movers: Sequence[Body]
+        self, uas: int, paths_m: Mapping[int, FloatArray], moving: Sequence[Body]
     ) -> FlightProgram:
         """The same for a flight that is made anew in every step, which needs less room."""
-        program = self.program(uas, paths_m, movers)
+        program = self.program(uas, paths_m, moving)
         return replace(
             program,
             model=flight_model(self.arena.vehicles[uas], _TRACKING_ROOM),
@@ -224,7 +224,7 @@ class Fleet:
         self,
         moment: Moment,
         routes: Mapping[int, IntArray],
-        movers: Mapping[int, Sequence[Body]],
+        moving: Mapping[int, Sequence[Body]],
         budget: int,
         known: Mapping[tuple[int, bytes], PlannedFlight],
         threads: int = 1,
@@ -234,14 +234,14 @@ class Fleet:
         Args:
             moment: Where everything is.
             routes: Waypoints of each UAS that is to fly.
-            movers: What moves, as each sees it.
+            moving: What moves, as each sees it.
             budget: Programs to solve for each, about.
             known: Flights by UAS and route that need no search where they still may be flown.
             threads: UAS planned side by side; the flights are the same.
         """
 
         def begun(u: int) -> Draft:
-            return done(self.draft(moment, u, routes[u], movers[u], budget, known))
+            return done(self.draft(moment, u, routes[u], moving[u], budget, known))
 
         with ThreadPoolExecutor(threads) as side_by_side:  # the solver frees the GIL
             return dict(zip(routes, side_by_side.map(begun, routes), strict=True))
@@ -251,12 +251,12 @@ class Fleet:
         moment: Moment,
         uas: int,
         route: IntArray,
-        movers: Sequence[Body],
+        moving: Sequence[Body],
         budget: int,
         known: Mapping[tuple[int, bytes], PlannedFlight],
     ) -> Work[Draft]:
         """One of the `drafts`."""
-        program = self.program(uas, {}, movers, _earliest(moment))
+        program = self.program(uas, {}, moving, _earliest(moment))
         same = known.get((uas, route.tobytes()))
         if same is not None and program.allows(route, same):
             return Draft(same, 0)
@@ -267,37 +267,37 @@ class Fleet:
         self,
         moment: Moment,
         routes: Mapping[int, IntArray],
-        movers: Mapping[int, Sequence[Body]],
+        moving: Mapping[int, Sequence[Body]],
         drafts: Mapping[int, Draft],
         threads: int = 1,
     ) -> dict[int, PlannedFlight]:
         """Each UAS's quickest flight, whatever the others fly; arguments as for `drafts`."""
 
         def alone(u: int) -> PlannedFlight:
-            return done(self.flight(moment, u, routes[u], movers[u], drafts[u]))
+            return done(self.flight(moment, u, routes[u], moving[u], drafts[u]))
 
         with ThreadPoolExecutor(threads) as side_by_side:
             return dict(zip(routes, side_by_side.map(alone, routes), strict=True))
 
     def flight(
-        self, moment: Moment, uas: int, route: IntArray, movers: Sequence[Body], begun: Draft
+        self, moment: Moment, uas: int, route: IntArray, moving: Sequence[Body], begun: Draft
     ) -> Work[PlannedFlight]:
         """One of the `flights`."""
-        program = self.program(uas, {}, movers, _earliest(moment))
+        program = self.program(uas, {}, moving, _earliest(moment))
         return finished(program, reduced_state(moment.x[uas]), route, begun)
 
     def apart(
         self,
         moment: Moment,
         routes: Mapping[int, IntArray],
-        movers: Mapping[int, Sequence[Body]],
+        moving: Mapping[int, Sequence[Body]],
         alone: Mapping[int, PlannedFlight],
     ) -> Work[dict[int, PlannedFlight]]:
         """The flights, of which a shorter one makes way for those that are longer."""
         flights: dict[int, PlannedFlight] = {}
         for u in sorted(alone, key=lambda k: (-alone[k].steps, k)):
             paths_m = {k: flight.path_m for k, flight in flights.items()}
-            program = self.program(u, paths_m, movers[u], _earliest(moment))
+            program = self.program(u, paths_m, moving[u], _earliest(moment))
             start = reduced_state(moment.x[u])
             flights[u] = yield from make_way(program, start, routes[u], alone[u])
         return flights

@@ -52,12 +52,12 @@ class Ahead(NamedTuple):
     Attributes:
         earliest: (W,) steps from then before which waypoints are not to be visited.
         forbidden: (U, W) which UAS are not to visit which waypoint, if any.
-        movers: What moves, as each UAS sees it from then on.
+        moving: What moves, as each UAS sees it from then on.
     """
 
     earliest: NDArray[np.int64]
     forbidden: BoolArray | None
-    movers: Mapping[int, Sequence[Body]]
+    moving: Mapping[int, Sequence[Body]]
 
 
 @dataclass
@@ -171,14 +171,14 @@ class Improvement:
         order = replace(plan.order, routes=tuple(routes), left_out=np.zeros(0, np.int64))
         self._n_attempts += 1
         seed = self._seed + 1000 * self._n_attempts
-        work = self._worked_out(moment, then, expected.movers, order, known, moves, seed)
+        work = self._worked_out(moment, then, expected.moving, order, known, moves, seed)
         return _Attempt(plan, then, work)
 
     def _worked_out(
         self,
         moment: Moment,
         then: int,
-        movers: Mapping[int, Sequence[Body]],
+        moving: Mapping[int, Sequence[Body]],
         order: Routes,
         known: dict,
         moves: int,
@@ -208,7 +208,7 @@ class Improvement:
             return None
         best_s = present_s - _CHEAPER_S
         found = yield from flown_along(
-            self._fleet, moment, then, movers, effort, new, known, best_s
+            self._fleet, moment, then, moving, effort, new, known, best_s
         )
         return found if found is not None and not found.troubles else None
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.mission_plan import is_idle
-from uas_coverage_baselines.trajectory.movers import Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.plan_in_force import PLAN_MARGIN_M, PlanInForce
 from uas_coverage_baselines.trajectory.replanning import Replanning
@@ -103,7 +103,7 @@ class MissionFlight:
             before = self._under_way.at(swarm)
         self._world.update(swarm)
         self.safeguard.backups.update(before.backups)
-        moving = Movers.seen(self._brief, swarm, unresponsive)
+        moving = MovingObstacles.seen(self._brief, swarm, unresponsive)
         self.in_force = self._replanning.made(swarm, moving, before, unresponsive, back)
         return self.in_force
 
@@ -115,7 +115,7 @@ class MissionFlight:
             self._begin(swarm, self._none, self._none)
         assert self.in_force is not None
         self._world.update(swarm)
-        moving = Movers.seen(self._brief, swarm, unresponsive)
+        moving = MovingObstacles.seen(self._brief, swarm, unresponsive)
         back = (swarm.status == FLYING) & self._down
         self._down = (swarm.status == LANDED) & ~unresponsive
         swarm = without(swarm, returning)

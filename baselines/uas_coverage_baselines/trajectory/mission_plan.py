@@ -173,7 +173,7 @@ def plan_mission(
     fleet: Fleet,
     moment: Moment,
     step: int,
-    movers: Mapping[int, Sequence[Body]],
+    moving: Mapping[int, Sequence[Body]],
     effort: Effort,
     seed: int,
     kept: Routes | None = None,
@@ -185,7 +185,7 @@ def plan_mission(
     Those that keep a UAS from flying its route are noted in the fleet, and left to others.
     """
     for _ in range(_PLANS_AT_MOST):
-        plan = _best_plan(fleet, moment, step, movers, effort, seed, kept, flown, fresh)
+        plan = _best_plan(fleet, moment, step, moving, effort, seed, kept, flown, fresh)
         stuck = [u for u, why in plan.troubles.items() if why == NO_FLIGHT]
         found = False
         for u in stuck:
@@ -201,7 +201,7 @@ def _best_plan(
     fleet: Fleet,
     moment: Moment,
     step: int,
-    movers: Mapping[int, Sequence[Body]],
+    moving: Mapping[int, Sequence[Body]],
     effort: Effort,
     seed: int,
     kept: Routes | None,
@@ -214,7 +214,7 @@ def _best_plan(
         fleet: The mission.
         moment: From where.
         step: Number of the sample.
-        movers: What moves, as each UAS sees it.
+        moving: What moves, as each UAS sees it.
         effort: How much to search.
         seed: Of the order search.
         kept: An order to begin from; none before take-off.
@@ -236,7 +236,7 @@ def _best_plan(
             key = tuple(route.tobytes() for route in order.routes)
             if key not in known:
                 known.add(key)
-                plan = _flown(fleet, moment, step, movers, effort, order, flights, best)
+                plan = _flown(fleet, moment, step, moving, effort, order, flights, best)
                 if plan is not None and (best is None or plan.cost_s < best.cost_s):
                     best = plan
         assert best is not None
@@ -289,7 +289,7 @@ def _flown(
     fleet: Fleet,
     moment: Moment,
     step: int,
-    movers: Mapping[int, Sequence[Body]],
+    moving: Mapping[int, Sequence[Body]],
     effort: Effort,
     order: Routes,
     known: dict[tuple[int, bytes], PlannedFlight],
@@ -301,12 +301,12 @@ def _flown(
     """
     routes = _routes(moment, order, step)
     programs = _programs(effort, len(routes))
-    drafts = fleet.drafts(moment, routes, movers, programs, known, effort.threads)
+    drafts = fleet.drafts(moment, routes, moving, programs, known, effort.threads)
     if best is not None and _least_s(fleet, effort, order, drafts) >= best.cost_s:
         return None
-    alone = fleet.flights(moment, routes, movers, drafts, effort.threads)
+    alone = fleet.flights(moment, routes, moving, drafts, effort.threads)
     known.update({(u, routes[u].tobytes()): flight for u, flight in alone.items()})
-    flights = done(fleet.apart(moment, routes, movers, alone))
+    flights = done(fleet.apart(moment, routes, moving, alone))
     return _verified(fleet, moment, step, effort, order, flights)
 
 
@@ -314,7 +314,7 @@ def flown_along(
     fleet: Fleet,
     moment: Moment,
     step: int,
-    movers: Mapping[int, Sequence[Body]],
+    moving: Mapping[int, Sequence[Body]],
     effort: Effort,
     order: Routes,
     known: Mapping[tuple[int, bytes], PlannedFlight],
@@ -328,13 +328,13 @@ def flown_along(
     programs = _programs(effort, len(routes))
     drafts: dict[int, Draft] = {}
     for u, route in routes.items():
-        drafts[u] = yield from fleet.draft(moment, u, route, movers[u], programs, known)
+        drafts[u] = yield from fleet.draft(moment, u, route, moving[u], programs, known)
         if _least_s(fleet, effort, order, drafts) >= best_s:
             return None
     alone: dict[int, PlannedFlight] = {}
     for u, route in routes.items():
-        alone[u] = yield from fleet.flight(moment, u, route, movers[u], drafts[u])
-    flights = yield from fleet.apart(moment, routes, movers, alone)
+        alone[u] = yield from fleet.flight(moment, u, route, moving[u], drafts[u])
+    flights = yield from fleet.apart(moment, routes, moving, alone)
     plan = _verified(fleet, moment, step, effort, order, flights)
     return plan if plan.cost_s < best_s else None
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.mission_plan import MissionPlan, Planned
-from uas_coverage_baselines.trajectory.movers import NEVER, Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import NEVER, MovingObstacles
 from uas_coverage_baselines.trajectory.waiting import Waiting
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.planning.reserves import BRAKING_S
@@ -50,7 +50,7 @@ class PlanInForce:
     had: frozenset[int]
     may_fly: BoolArray
     unresponsive: BoolArray
-    moving: Movers
+    moving: MovingObstacles
     blocked: BoolArray
     latest_visit: NDArray[np.int64]
     waiting: Waiting
@@ -100,7 +100,7 @@ class PlanInForce:
     def why_plan_anew(
         self,
         swarm: SwarmState,
-        moving: Movers,
+        moving: MovingObstacles,
         fleet: Fleet,
         down: BoolArray,
         back: BoolArray,
@@ -138,7 +138,13 @@ class PlanInForce:
         return self._why_not_beside(swarm, moving, fleet, waited=waited, hands_over=hands_over)
 
     def _why_not_beside(
-        self, swarm: SwarmState, moving: Movers, fleet: Fleet, *, waited: bool, hands_over: bool
+        self,
+        swarm: SwarmState,
+        moving: MovingObstacles,
+        fleet: Fleet,
+        *,
+        waited: bool,
+        hands_over: bool,
     ) -> str | None:
         """Likewise, for what moves."""
         if len(moving) != len(self.moving) or moving.has_turned(self.moving):

@@ -17,7 +17,7 @@ from uas_coverage_baselines.trajectory.mission_plan import (
     order_effort,
     plan_mission,
 )
-from uas_coverage_baselines.trajectory.movers import NEVER, Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import NEVER, MovingObstacles
 from uas_coverage_baselines.trajectory.options import TrajectoryOptions
 from uas_coverage_baselines.trajectory.plan_in_force import PlanInForce
 from uas_coverage_baselines.trajectory.under_way import UnderWay
@@ -57,7 +57,7 @@ class Replanning:
     def made(
         self,
         swarm: SwarmState,
-        moving: Movers,
+        moving: MovingObstacles,
         before: PlanInForce | UnderWay,
         unresponsive: BoolArray,
         back: BoolArray,
@@ -122,7 +122,11 @@ class Replanning:
         )  # fmt: skip
 
     def improve(
-        self, in_force: PlanInForce, swarm: SwarmState, moving: Movers, followed: Collection[int]
+        self,
+        in_force: PlanInForce,
+        swarm: SwarmState,
+        moving: MovingObstacles,
+        followed: Collection[int],
     ) -> None:
         """Look for a better plan, and let it take over, where it is known where the UAS will be.
 
@@ -149,7 +153,7 @@ class Replanning:
         planned: Mapping[int, Planned],
         in_force: PlanInForce,
         swarm: SwarmState,
-        moving: Movers,
+        moving: MovingObstacles,
     ) -> Ahead:
         """What to expect at a step, of flights that go on until then."""
         fleet, expected = self._fleet, moving.later(then - swarm.step)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.trajectory.course import Course, are_apart, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet
-from uas_coverage_baselines.trajectory.movers import Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.trajectory.space import spare_of_rules_m
 from uas_coverage_env.autopilot.assist import assist, assistants
 from uas_coverage_env.autopilot.control import command_wrench
@@ -37,13 +37,13 @@ class Seen:
 
     Attributes:
         fleet: The mission.
-        movers: What moves, as it is seen.
+        moving: What moves, as it is seen.
         margin_m: Kept from what moves, in addition to its safe distance.
         way_home: Of the UAS.
     """
 
     fleet: Fleet
-    movers: Movers
+    moving: MovingObstacles
     margin_m: float
     way_home: Range
 
@@ -51,7 +51,7 @@ class Seen:
         """Whether a course is clear of what moves; what stands was verified before."""
         path_m = course.path_m(max(len(course.u), 1))
         radius_m = self.fleet.brief.uas[uas].radius_m
-        return self.movers.spare_m(path_m, radius_m, self.margin_m) >= 0.0
+        return self.moving.spare_m(path_m, radius_m, self.margin_m) >= 0.0
 
     def may_stop(self, uas: int, course: Course, followed: int) -> bool:
         """Whether a course that ends in a hover is clear of what moves and what stands."""
@@ -94,7 +94,7 @@ class Safeguard:
         self,
         swarm: SwarmState,
         wanted: Mapping[int, Course],
-        movers: Movers,
+        moving: MovingObstacles,
         staying: Collection[int] = (),
     ) -> dict[int, tuple[Course, bool]]:
         """What each UAS flies from now on: its course, or what is left of its backup trajectory.
@@ -102,7 +102,7 @@ class Safeguard:
         Args:
             swarm: Where the UAS are.
             wanted: Courses of UAS that have one, from this sample on and verified.
-            movers: What moves, as it is seen.
+            moving: What moves, as it is seen.
             staying: UAS that land where they are, and are gone after this step.
 
         Returns:
@@ -112,7 +112,7 @@ class Safeguard:
         step, x = swarm.step, swarm.x
         flying = {u: x[u] for u in np.flatnonzero(swarm.status == FLYING).tolist()}
         landing = {u: _landing_here(self._fleet, u, step, x[u]) for u in staying}
-        checks = Seen(self._fleet, movers, self._margin_m, self._way_home)
+        checks = Seen(self._fleet, moving, self._margin_m, self._way_home)
         follow = self._supervisor.renew(checks, step, flying, wanted, landing)
         return {u: (course, u in follow) for u, course in self.backups.items()}
 

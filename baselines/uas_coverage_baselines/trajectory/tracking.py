@@ -11,10 +11,10 @@ from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.flight_model import reduced_state
 from uas_coverage_baselines.trajectory.mission_plan import Planned
-from uas_coverage_baselines.trajectory.movers import Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.trajectory.plan_in_force import PlanInForce
 from uas_coverage_baselines.trajectory.program import FlightProgram, PlannedFlight
-from uas_coverage_baselines.trajectory.retiming import repair, retimed, shifted, worth
+from uas_coverage_baselines.trajectory.retiming import repair, retimed, shifted, stretches
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.steering import Failures
 from uas_coverage_baselines.trajectory.work import done
@@ -57,7 +57,7 @@ class Tracking:
         self,
         in_force: PlanInForce,
         swarm: SwarmState,
-        movers: Movers,
+        moving: MovingObstacles,
         as_planned: Collection[int],
     ) -> None:
         """Plan from where the UAS are, where that is not where they were planned to be.
@@ -65,7 +65,7 @@ class Tracking:
         Args:
             in_force: What is flown; changed.
             swarm: Where the UAS are.
-            movers: What moves.
+            moving: What moves.
             as_planned: UAS that were sent along their plans in the step before.
         """
         self._failures.next_step()
@@ -84,9 +84,9 @@ class Tracking:
                 self.is_disturbed = True
                 self._fleet.leave_room()
                 for k in list(in_force.planned):
-                    self._refit(k, in_force, self._fleet.program, swarm, movers)
+                    self._refit(k, in_force, self._fleet.program, swarm, moving)
                 return
-            later = self._refit(u, in_force, self._fleet.tracking_program, swarm, movers)
+            later = self._refit(u, in_force, self._fleet.tracking_program, swarm, moving)
             self._failures.add(float(obeys * later))
 
     def _refit(
@@ -95,10 +95,10 @@ class Tracking:
         in_force: PlanInForce,
         program_of: ProgramOf,
         swarm: SwarmState,
-        movers: Movers,
+        moving: MovingObstacles,
     ) -> int:
         """Plan the same visits from where a UAS is; steps by which its flight ends later."""
-        new = tracked(self._fleet, uas, in_force.planned, swarm, movers, program_of)
+        new = tracked(self._fleet, uas, in_force.planned, swarm, moving, program_of)
         return in_force.fly_instead(uas, new)
 
 
@@ -111,7 +111,7 @@ def tracked(
     uas: int,
     planned: Mapping[int, Planned],
     swarm: SwarmState,
-    movers: Movers,
+    moving: MovingObstacles,
     program_of: ProgramOf,
 ) -> Planned | None:
     """The same visits from here, in time or a little later; None where that is not possible.
@@ -121,21 +121,21 @@ def tracked(
         uas: Index of the UAS.
         planned: What it and the others were to do.
         swarm: Where it is.
-        movers: What moves.
+        moving: What moves.
         program_of: Where a program leaves room in the limits, the flight takes so much longer.
     """
     route, rest = planned[uas].rest(swarm.step, swarm.uncovered)
     if rest.steps < 2:  # too late for another
         return _checked(fleet, uas, swarm, route, rest) if rest.steps else None
     paths_m = {k: p.course.rest(swarm.step).path_m(_ALL) for k, p in planned.items() if k != uas}
-    program = program_of(uas, paths_m, fleet.bodies(movers, uas))
+    program = program_of(uas, paths_m, fleet.bodies(moving, uas))
     slower, start = 1.0 + program.reserve, reduced_state(swarm.x[uas])
     visits = np.ceil(slower * rest.visits).astype(np.int64)
     new = retimed(program, start, route, rest, visits, int(np.ceil(slower * rest.steps)))
     for later in range(_MOST_LATER + 1):
-        if later:  # a step more where it is worth most
-            order, gain, _ = worth(new)
-            visits = shifted(new.visits, order, int(np.argmax(gain)), 1)
+        if later:  # a step more in the longest stretch
+            order, lengths = stretches(new)
+            visits = shifted(new.visits, order, int(np.argmax(lengths)), 1)
             new = retimed(program, start, route, new, visits, new.steps + 1)
         if not program.visits_all(route, new):
             new = done(repair(program, start, route, new, _REPAIRS))

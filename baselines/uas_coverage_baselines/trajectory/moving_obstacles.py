@@ -27,7 +27,7 @@ _SURPRISE_S = 1.0  # what moves may turn: its keep-out is widened by how far it 
 
 
 @dataclass(frozen=True)
-class Movers:
+class MovingObstacles:
     """Moving obstacles predicted from one sample on.
 
     Attributes:
@@ -49,18 +49,22 @@ class Movers:
     n_obstacles: int
 
     @staticmethod
-    def seen(brief: MissionBrief, swarm: SwarmState, silent: NDArray[np.bool_]) -> Movers:
+    def seen(
+        brief: MissionBrief, swarm: SwarmState, unresponsive: NDArray[np.bool_]
+    ) -> MovingObstacles:
         """What is seen in a state.
 
         Args:
             brief: The mission.
             swarm: The state.
-            silent: (U,) UAS that take no commands: they move as anything does.
+            unresponsive: (U,) UAS that take no commands: they move as anything does.
         """
-        obstacles, x = brief.moving_obstacles, swarm.x[silent]
-        radius_m = [uas.radius_m for uas, there in zip(brief.uas, silent, strict=True) if there]
+        obstacles, x = brief.moving_obstacles, swarm.x[unresponsive]
+        radius_m = [
+            uas.radius_m for uas, there in zip(brief.uas, unresponsive, strict=True) if there
+        ]
         points = np.zeros(len(x))
-        return Movers(
+        return MovingObstacles(
             np.vstack([np.reshape(swarm.moving_position_m, (-1, 3)), x[:, :3]]),
             np.vstack([np.reshape(swarm.moving_velocity_mps, (-1, 3)), x[:, VX : VZ + 1]]),
             np.append(np.array([o.radius_m for o in obstacles], float), points),
@@ -76,12 +80,12 @@ class Movers:
     def __len__(self) -> int:
         return len(self.radius_m)
 
-    def has_turned(self, before: Movers) -> bool:
+    def has_turned(self, before: MovingObstacles) -> bool:
         """Whether a moving obstacle has another velocity than before."""
         n = self.n_obstacles
         return not np.array_equal(self.velocity_mps[:n], before.velocity_mps[:n])
 
-    def off_m(self, before: Movers, later_s: float) -> float:
+    def off_m(self, before: MovingObstacles, later_s: float) -> float:
         """How far UAS are from where they would be now by what was seen before.
 
         Args:
@@ -92,7 +96,7 @@ class Movers:
         away_m = np.linalg.norm(self.position_m - expected_m, axis=1)[self.n_obstacles :]
         return float(away_m.max(initial=0.0))
 
-    def later(self, steps: int) -> Movers:
+    def later(self, steps: int) -> MovingObstacles:
         """Where they will be after some steps."""
         return replace(self, position_m=self.position_m + steps * self.dt_s * self.velocity_mps)
 

@@ -7,7 +7,7 @@ import pytest
 from hand_made import NOTHING, moving
 from small_fleets import fleet_of
 from small_worlds import box, meadow, mover
-from uas_coverage_baselines.trajectory.movers import NEVER, Movers
+from uas_coverage_baselines.trajectory.moving_obstacles import NEVER, MovingObstacles
 from uas_coverage_baselines.trajectory.space import (
     spare_fixed_m,
     spare_from_body_m,
@@ -27,8 +27,8 @@ def path(*places):
     return np.array(places, float)
 
 
-def spare(movers, *places):
-    return movers.spare_m(path(*places), UAS_M, MARGIN_M)
+def spare(moving, *places):
+    return moving.spare_m(path(*places), UAS_M, MARGIN_M)
 
 
 # how far a path keeps from what moves
@@ -104,7 +104,7 @@ def test_obstacles_and_silent_uas_are_seen_with_their_sizes_and_distances():
     fleet, swarm = fleet_of(scenario)
     x = swarm.x.copy()
     x[1, VX : VZ + 1] = 3.0, 2.0, -1.0
-    seen = Movers.seen(
+    seen = MovingObstacles.seen(
         fleet.brief,
         replace(swarm, x=x, moving_velocity_mps=np.array([[1.0, -2.0, 0.0]])),
         np.array([False, True]),
