@@ -301,3 +301,21 @@ def test_between_walls_the_slower_or_shorter_flight_with_most_room_is_flown():
     np.testing.assert_allclose(velocity_mps, best, atol=1e-9)
     assert 0.0 < np.linalg.norm(velocity_mps) < 11.0
     assert fixed_slack(world.arena, 0, path_m, len(path_m) - 1, 0.0, PLENTY_M) >= -1e-3
+
+
+def test_in_a_yard_that_leaves_room_for_one_step_at_full_speed_that_step_is_flown():
+    walls = [
+        box("north", (116.0, 80.0, -49.0), (120.0, 120.0, 0.0), 1.0),
+        box("south", (80.0, 80.0, -49.0), (84.0, 120.0, 0.0), 1.0),
+        box("east", (84.0, 116.0, -49.0), (116.0, 120.0, 0.0), 1.0),
+        box("west", (84.0, 80.0, -49.0), (116.0, 84.0, 0.0), 1.0),
+    ]
+    comes = mover((100.0, 80.0, -20.0), (0.0, (0.0, 3.0, 0.0)), radius_m=3.0, height_m=60.0,
+                  safe_distance_m=2.0)  # fmt: skip
+    world, committed_m = watched([(100.0, 100.0, -20.0)], [comes], walls)
+    ahead_mps = (float(world.arena.uas[0].speed_mps), 0.0, 0.0)
+    assert room_held(world, committed_m, ahead_mps, 1) == ENOUGH_M
+    assert room_held(world, committed_m, ahead_mps, 2) is None
+    safe, velocity_mps, _ = evaded(world, committed_m)
+    assert safe
+    np.testing.assert_allclose(velocity_mps, ahead_mps)
