@@ -53,7 +53,7 @@ ROUTED_UAS_DTYPE = record_dtype(
 """One UAS (with trips: one of its flights) of a `RoutingProblem`."""
 
 
-class Seen(Protocol):
+class SeenSwarm(Protocol):
     """What is seen of a swarm: a `SwarmState`, or any record with these three."""
 
     @property
@@ -105,7 +105,7 @@ class RoutingProblem:
     def seen(
         cls,
         brief: MissionBrief,
-        swarm: Seen,
+        swarm: SeenSwarm,
         legs: Legs | Terrain,
         works: BoolArray,
         reserve: Reserve,
@@ -201,7 +201,7 @@ def battery_s(brief: MissionBrief, legs: Legs, x: FloatArray) -> FloatArray:
 
 def budget_s(
     brief: MissionBrief,
-    swarm: Seen,
+    swarm: SeenSwarm,
     legs: Legs,
     reserve: Reserve,
     *,
