@@ -101,6 +101,13 @@ def test_the_end_of_the_mission_counts_like_the_end_of_the_charge(step, left_s):
     assert (scene.apply() is None) == (left_s >= 30.0)
 
 
+def test_the_end_of_the_mission_is_counted_in_seconds():
+    way_s = 300.0 - 249 - 30.0
+    scene = Scene(step=200, dt_s=0.5)
+    assert scene.left_s(0) == pytest.approx(0.5 * 100 - way_s, abs=1.0)
+    assert scene.apply().home == {"uas_1", "uas_2"}
+
+
 def test_the_others_go_on_with_their_backups_and_hover_at_their_ends():
     scene = scarce(0, 20.0)
     backup = scene.hovers(3)
@@ -213,9 +220,11 @@ def test_a_route_into_what_stands_is_not_flown():
 # when a UAS has to return
 
 
-def test_a_uas_has_to_return_while_a_decision_later_still_comes_home():
+@pytest.mark.parametrize(("dt_s", "later_s"), [(1.0, 2.0), (0.5, 1.0)])
+def test_a_uas_has_to_return_while_a_decision_later_still_comes_home(dt_s, later_s):
     def has_to(dod):
-        return Scene((dod, 0.2)).follower.has_to_return(Scene((dod, 0.2)).problem, 0)
+        scene = Scene((dod, 0.2), dt_s=dt_s)
+        return scene.follower.has_to_return(scene.problem, 0)
 
     low, high = 0.2, 0.75
     assert not has_to(low)
@@ -228,4 +237,4 @@ def test_a_uas_has_to_return_while_a_decision_later_still_comes_home():
     # charge for the way with its margin, and two steps more
     estimate = Range(MissionBrief.of(mission(PLACES, STARTS))).home(0, scene.swarm.x[0])
     left_s = (0.75 - high) / per_s
-    assert left_s == pytest.approx(estimate.time_s + estimate.time_margin_s + 2.0, abs=1.0)
+    assert left_s == pytest.approx(estimate.time_s + estimate.time_margin_s + later_s, abs=0.3)
