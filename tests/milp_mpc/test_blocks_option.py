@@ -70,7 +70,10 @@ def run(*options, planner="milp-mpc", steps=8):
 
 @pytest.mark.parametrize("order", ["none", "search"])
 def test_a_block_of_a_file_beside_the_command_is_flown(order):
-    assert run("blocks=my_own_blocks:Low, my_own_blocks:Dear", f"order={order}") == 0
+    assert (
+        run("blocks=my_own_blocks:Low, my_own_blocks:Dear", f"order={order}", "waypoint_sides=12")
+        == 0
+    )
     flight = Flight.load("mine")
     assert 5.0 < -flight.x[:, 0, 2].min() <= 9.0 + 1e-4
     assert flight.planner_options["blocks"] == ["my_own_blocks:Low", "my_own_blocks:Dear"]
