@@ -141,3 +141,18 @@ def test_a_flight_says_why_there_were_fallbacks(capsys):
     run_json = json.loads(Path("late/run.json").read_text(encoding="utf-8"))
     assert [one["reason"] for one in run_json["decisions"]] == ["no time"] * 3
     assert [one.reason for one in Flight.load("late").decisions] == ["no time"] * 3
+
+
+@pytest.mark.parametrize(
+    ("given", "follows"),
+    [
+        ({"deterministic": "true"}, "every flight repeats"),
+        ({"moving_acceleration_mps2": "3"}, "moving_margin_m"),
+        ({"in_wind": "tube"}, "in_wind=guidance"),
+    ],
+)
+@pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-paper"])
+def test_an_option_that_went_is_answered_with_what_follows_it(planner, given, follows):
+    with pytest.raises(InputError, match=follows) as told:
+        load_planner(planner, given)
+    assert "\n" not in str(told.value)
