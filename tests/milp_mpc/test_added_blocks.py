@@ -53,7 +53,9 @@ def grounded():
 
 def made(order, scenario, *added):
     """The planner with blocks added, ready for the mission."""
-    options = MilpMpc.Options(horizon=8, teams=1, order=order)
+    # places that are covered in order have to be within reach below a ceiling, too
+    sides = {"waypoint_sides": 12} if order == "search" else {}
+    options = MilpMpc.Options(horizon=8, teams=1, order=order, **sides)
     result = MilpMpc(options, blocks=(*OCP, *added))
     result.reset(MissionBrief.of(scenario), 0)
     return result

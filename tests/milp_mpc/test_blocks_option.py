@@ -70,7 +70,10 @@ def run(*options, planner="milp-mpc", steps=8):
 
 @pytest.mark.parametrize("order", ["none", "search"])
 def test_a_block_of_a_file_beside_the_command_is_flown(order):
-    assert run("blocks=my_own_blocks:Low, my_own_blocks:Dear", f"order={order}") == 0
+    assert (
+        run("blocks=my_own_blocks:Low, my_own_blocks:Dear", f"order={order}", "waypoint_sides=12")
+        == 0
+    )
     flight = Flight.load("mine")
     assert 5.0 < -flight.x[:, 0, 2].min() <= 9.0 + 1e-4
     assert flight.planner_options["blocks"] == ["my_own_blocks:Low", "my_own_blocks:Dear"]
@@ -138,3 +141,18 @@ def test_a_flight_says_why_there_were_fallbacks(capsys):
     run_json = json.loads(Path("late/run.json").read_text(encoding="utf-8"))
     assert [one["reason"] for one in run_json["decisions"]] == ["no time"] * 3
     assert [one.reason for one in Flight.load("late").decisions] == ["no time"] * 3
+
+
+@pytest.mark.parametrize(
+    ("given", "follows"),
+    [
+        ({"deterministic": "true"}, "every flight repeats"),
+        ({"moving_acceleration_mps2": "3"}, "moving_margin_m"),
+        ({"in_wind": "tube"}, "in_wind=guidance"),
+    ],
+)
+@pytest.mark.parametrize("planner", ["milp-mpc", "milp-mpc-paper"])
+def test_an_option_that_went_is_answered_with_what_follows_it(planner, given, follows):
+    with pytest.raises(InputError, match=follows) as told:
+        load_planner(planner, given)
+    assert "\n" not in str(told.value)

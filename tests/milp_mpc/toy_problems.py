@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, formulate, shared_variables
-from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
+from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem, Target
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
@@ -149,3 +149,22 @@ def planned(outcome) -> Plan:
     """What `decide` answers, where it is a plan and no reason for having none."""
     assert isinstance(outcome, Plan), outcome
     return outcome
+
+
+def two_around_a_tower(n_uas=2, horizon=7):
+    """Two UAS in flight, a tower between them and waypoints on both sides."""
+    starts = [
+        flight(S500, state((80.0, 70.0, -12.0)), [(4.0, 2.0, 0.0)] * 3)[-1],
+        flight(S500, state((80.0, 100.0, -12.0)), [(5.0, -1.0, 0.0)] * 3)[-1],
+    ]
+    return toy(
+        *starts[:n_uas],
+        horizon=horizon,
+        obstacles=[box((105.0, 80.0, -25.0), (115.0, 92.0, 0.0))],
+        waypoints=[
+            ((108.0, 74.0, -12.0), 12.0),
+            ((110.0, 99.0, -12.0), 10.0, 2.0),
+            ((98.0, 86.0, -14.0), 10.0),
+        ],
+        targets=[Target(np.array([180.0, 90.0, -12.0]), 0.02), None][:n_uas],
+    )

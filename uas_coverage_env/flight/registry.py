@@ -195,7 +195,8 @@ def _checked_options(name: str, model: type[BaseModel], given: Mapping[str, Any]
     allowed = ", ".join(model.model_fields) or "none"
     for key in given:
         if key not in model.model_fields:
-            instead = did_you_mean(key, model.model_fields, f"allowed: {allowed}")
+            gone = getattr(model, "GONE", {}).get(key)  # options of earlier versions
+            instead = gone or did_you_mean(key, model.model_fields, f"allowed: {allowed}")
             raise InputError(f"planner {name!r} has no option {key!r}; {instead}")
     try:
         return model.model_validate(dict(given))
