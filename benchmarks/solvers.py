@@ -28,7 +28,7 @@ FREE = 2000
 """Rows, and columns, that gurobipy's free licence allows."""
 
 
-def small(problem: PlanningProblem) -> RestrictedMilp:
+def small(problem: PlanningProblem) -> RestrictedMilp | None:
     """One UAS's program with as many of the nearest waypoints as the free licence allows."""
     away_m = np.linalg.norm(problem.waypoints_m - problem.x0[0, :3], axis=1)
     nearest = np.argsort(away_m, kind="stable")
@@ -46,7 +46,7 @@ def small(problem: PlanningProblem) -> RestrictedMilp:
         program = RestrictedMilp(few, first=TIGHTEST)
         if max(len(program.built.row_lower), len(program.built.cost)) <= FREE:
             return program
-    raise SystemExit("no program is small enough")
+    return None
 
 
 def main(
@@ -64,14 +64,19 @@ def main(
     ]
     lines.append("| --- | ---: | ---: |" + " ---: |" * len(SOLVERS))
     limits = SolverLimits(time_s=cap, relative_gap=gap, absolute_gap=1e-6)
+    unit_s: list[float] = []  # of HiGHS, per iteration and row: what work is counted by
     times: dict[str, list[float]] = {name: [] for name in SOLVERS}
     for step, uas, problem in track(programs, console=Console(stderr=True)):
         program = small(problem)
+        if program is None:  # too many rows of obstacles
+            continue
         cells = []
         for name in SOLVERS:
             began = time.process_time()
             solution = solver_named(name)(program.built, limits)
             took_s = time.process_time() - began
+            if name == "highs":
+                unit_s.append(took_s / max(solution.iterations * len(program.built.row_lower), 1))
             missing = (solution.objective - solution.bound) / max(abs(solution.objective), 1e-9)
             reached = (
                 missing <= gap * 1.05 + 1e-9
@@ -87,7 +92,10 @@ def main(
             + " |"
         )
     medians = " | ".join(f"{np.median(times[name]):.2f}" for name in SOLVERS)
-    lines.append(f"| median of {len(programs)} | | | {medians} |")
+    lines.append(f"| median of {len(times['highs'])} | | | {medians} |")
+    lines.append(
+        f"\nHiGHS: {1e9 * np.median(unit_s):.0f} ns per simplex iteration and row (median)"
+    )
     print("\n".join(lines))
 
 

@@ -98,6 +98,8 @@ QUICK = {
     ),
     "routing/test_order_search.py": "but test_the_search_finds_the_optimum_of_all_orders",
     "paper/test_battery_figure.py": "",
+    "planning/test_around.py": "",
+    "planning/test_following.py": "",
     "planning/test_backup_courses.py": "",
     "planning/test_reserves.py": "",
     "reproduction/test_comparison.py": "",

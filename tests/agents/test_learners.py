@@ -14,11 +14,11 @@ from uas_coverage_agents.policy import load_policy
 from uas_coverage_agents.training import curve
 from uas_coverage_agents.training.central_critic import CentralCriticPolicy
 from uas_coverage_agents.training.checkpoint import CHECKPOINT
-from uas_coverage_agents.training.learner import Told, learner_of
+from uas_coverage_agents.training.learner import Told
 from uas_coverage_agents.training.library import LibraryLearner
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.policy_runner import EnvironmentRunner
-from uas_coverage_agents.training.rounds import TrainingJob, TrainingProgress, train
+from uas_coverage_agents.training.rounds import TrainingJob, TrainingProgress, learner_of, train
 
 from uas_coverage_env import MissionBrief, generate_scenario, load_planner, rollout
 from uas_coverage_env.env import CoverageParallelEnv

@@ -1,7 +1,7 @@
 """Trainings that learn next to nothing, quickly."""
 
-from uas_coverage_agents.training.learner import learner_of
 from uas_coverage_agents.training.missions import Missions
+from uas_coverage_agents.training.rounds import learner_of
 from uas_coverage_agents.training.settings import LearnerSettings, settings_of
 
 SMALL = ("num_envs=2", "rounds=2", "total_timesteps=64")

@@ -17,6 +17,7 @@ from uas_coverage_baselines.milp_mpc.search import team_search
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import NARROW, WIDE, RestrictedMilp
+from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_baselines.milp_mpc.search.trajectories import PlannedTrajectory, teams
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
@@ -155,9 +156,20 @@ def test_with_less_work_fewer_programs_are_solved_and_each_uas_has_a_plan(proble
     monkeypatch.setattr(team_search.TeamSearch, "_refined", counting)
     little = dataclasses.replace(BY_NODES, work=1e-3)
     for effort in (little, BY_NODES):
-        plan = planned(decide(problem, None, 1.0, effort))
+        turns = RoundRobin()
+        turns.work_of_one = 1e-6  # so that both are planned for
+        plan = planned(decide(problem, None, 1.0, effort, round_robin=turns))
         assert set(plan.renewed) == set(problem.names)
     assert counted.count(little.work) < counted.count(BY_NODES.work)
+
+
+@pytest.mark.parametrize(("of_one", "many"), [(0.05, 2), (0.3, 1), (3.0, 1)])
+def test_as_many_uas_are_planned_for_as_the_work_suffices_for(problem, of_one, many):
+    search, turns = team_search.TeamSearch(problem, BY_NODES, time.perf_counter()), RoundRobin()
+    turns.work_of_one = of_one
+    first, then = (search.planned(turns, []) for _ in range(2))
+    assert len(first) == len(then) == many
+    assert set(first + then) == {0, 1}, "the other one is next"
 
 
 def test_one_uas_with_work_enough_gets_its_best_plan():

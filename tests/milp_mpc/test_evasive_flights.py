@@ -102,6 +102,24 @@ def test_a_uas_at_the_fence_stays_within_its_margin():
     assert plan.x[0, -1, 0] < 97.0
 
 
+@pytest.mark.parametrize(("margin_m", "moves"), [(1.49, False), (1.51, True)])
+def test_a_uas_within_the_fence_s_margin_leaves_it(margin_m, moves):
+    fence = box((0.0, 0.0, -50.0), (101.5, 200.0, 0.0))
+    plan = evasion(toy(state(HERE), fence=fence, fence_margin_m=margin_m), 1.0)
+    assert (plan is not None) == moves
+    assert plan is None or plan.x[0, -1, 0] < 99.99
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_a_uas_gets_over_or_under_what_is_wide(up):
+    place = np.add(HERE, (0.0, -150.0, 2.0 * up))  # z is down
+    problem = coming((place, (0.0, 9.0, 0.0)), radius_m=70.0, half_height_m=3.0)
+    plan = evasion(problem, 1.0)
+    assert is_clear(problem, plan)
+    assert up * (plan.x[0, -1, 2] - HERE[2]) < -2.5
+    assert np.abs(plan.x[0, -1, :2] - HERE[:2]).max() < 0.1
+
+
 def test_a_uas_does_not_go_down_below_the_least_height():
     low = (100.0, 100.0, -8.0)
     flat = np.add(low, (0.0, -60.0, -3.0)), (0.0, 6.0, 0.0)  # comes above its middle

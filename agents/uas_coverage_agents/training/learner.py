@@ -27,8 +27,6 @@ from uas_coverage_agents.policy.description import (
     Training,
 )
 from uas_coverage_agents.policy.networks import Network
-from uas_coverage_agents.training.missions import Missions
-from uas_coverage_agents.training.settings import LearnerSettings, class_named
 from uas_coverage_env.plugins.installed import version_of
 
 _PACKAGES = ("uas-coverage-env", "numpy", "torch", "stable-baselines3", "sb3-contrib")
@@ -116,17 +114,3 @@ class Learner(Protocol):
     def learned(self) -> Learned:
         """What would fly now."""
         ...
-
-
-def learner_of(settings: LearnerSettings, missions: Missions, seed: int) -> Learner:
-    """A learner that has learned nothing.
-
-    Raises:
-        InputError: The class cannot be loaded or made; one line.
-    """
-    found = class_named(settings.algorithm)
-    if hasattr(found, "learned"):
-        return found(settings, missions, seed)
-    from uas_coverage_agents.training.library import LibraryLearner
-
-    return LibraryLearner(settings, missions, seed, found)

@@ -27,7 +27,6 @@ from uas_coverage_agents.training.learner import (
     Arrays,
     Learner,
     Told,
-    learner_of,
 )
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.score import (
@@ -37,7 +36,7 @@ from uas_coverage_agents.training.score import (
     point_of,
     score_of,
 )
-from uas_coverage_agents.training.settings import LearnerSettings
+from uas_coverage_agents.training.settings import LearnerSettings, class_named
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.flying import fly
 from uas_coverage_env.leaderboard.sweep import source_of
@@ -216,6 +215,20 @@ class _Queue(Iterator[Job | None]):
         if rounds < job.settings.rounds:
             arrays = dict(checkpoint.arrays) if checkpoint else None
             self._waiting.append(Job(str(place), one_round, (job, rounds, arrays)))
+
+
+def learner_of(settings: LearnerSettings, missions: Missions, seed: int) -> Learner:
+    """A learner that has learned nothing.
+
+    Raises:
+        InputError: The class cannot be loaded or made; one line.
+    """
+    found = class_named(settings.algorithm)
+    if hasattr(found, "learned"):
+        return found(settings, missions, seed)
+    from uas_coverage_agents.training.library import LibraryLearner
+
+    return LibraryLearner(settings, missions, seed, found)
 
 
 def policy_of(job: TrainingJob, learner: Learner, process_s: float, wall_s: float) -> Policy:
