@@ -112,9 +112,10 @@ def test_a_flight_keeps_the_fences_margin_until_it_has_landed(alone, gap_m, says
 def test_a_flight_ends_within_the_landing_distance(alone, beyond_m, says):
     fleet, x, flight = alone
     x[1] += 3.0
+    x[S.VX : S.VZ + 1] = (0.6, -0.5, 0.4)  # the sample before is elsewhere
     end_m = course_of(fleet, 0, 0, x, flight).x[-1, :3]
-    away_m = np.linalg.norm(end_m - START)
-    assert trouble_alone(with_landing(fleet, distance_m=away_m + beyond_m), 0, x, flight) == says
+    known = {"distance_m": np.linalg.norm(end_m - START) + beyond_m, "speed_mps": 5.0}
+    assert trouble_alone(with_landing(fleet, **known), 0, x, flight) == says
 
 
 @pytest.mark.parametrize(("beyond_mps", "says"), [(-1e-3, "does not land"), (1e-3, None)])
