@@ -116,3 +116,14 @@ def test_what_is_replaced_in_a_problem_leaves_the_problem_it_was_made_of_as_it_i
     assert less.uas["speed_mps"].tolist() == MANY.uas["speed_mps"].tolist()
     with pytest.raises(TypeError, match="budgets"):
         MANY.replace(budgets=np.zeros(2))
+
+
+def test_a_stretch_that_is_reversed_takes_what_its_legs_take_that_way():
+    """Judged by sums along the route, where legs take longer the later they end in the list."""
+    windy = task(9, 24, 1)
+    windy = windy.replace(between_s=windy.between_s * np.linspace(0.5, 1.5, 24))
+    effort = SearchEffort(3_000, by_pieces=True, operators=("2-opt",))
+    found = improve_routes(windy, routes_of([np.arange(24)]), effort, 0)
+    again = improve_routes(windy, found, SearchEffort(0), 0)
+    assert found.seconds == pytest.approx(again.seconds, abs=1e-6)
+    assert found.cost_s == pytest.approx(again.cost_s, abs=1e-6)
