@@ -14,7 +14,9 @@ from uas_coverage_env.files.digits import three_digits
 from uas_coverage_env.world import Command, SwarmState
 
 FIRST_SEED = 14000
-LIMIT_S, MOST = 1.0, 1.5
+MOST = 1.5
+MEANT_S: Mapping[str, float] = {"milp-mpc": 1.0}
+"""Planner -> what its counted effort is meant to take in 95 of 100 decisions [s]."""
 
 PLANNERS: Mapping[str, tuple[Mapping[str, str], int | None]] = {
     "nearest-waypoint": ({}, None),
@@ -77,36 +79,37 @@ def trials(quick: bool) -> list[Trial]:
 
 
 def finding(results: Mapping[str, Result]) -> Finding:
-    """A decision of a planner with a clock has failed beyond MOST times its limit.
+    """A decision of a planner that counts its work has failed beyond MOST times what is meant.
 
     Those of the others are timed, and fail by an exception alone: they are not counted.
     """
     rows, decisions, failed = [], 0, len(errors(results))
-    for planner, (options, _) in PLANNERS.items():
+    for planner in PLANNERS:
         mine = [one["cpu_s"] for one in results.values() if one.get("planner") == planner]
         if not mine:
             continue
         cpu_s = np.concatenate(mine)
-        limit_s = float(options.get("time_limit_s", "inf"))
+        limit_s = MEANT_S.get(planner, float("inf"))
         late = int((cpu_s > MOST * limit_s).sum())
         decisions, failed = decisions + len(cpu_s) * bool(np.isfinite(limit_s)), failed + late
         figures = [*np.quantile(cpu_s, (0.5, 0.95, 0.99)), cpu_s.max()]
         limit = f"{limit_s:g}" if np.isfinite(limit_s) else "none"
         milliseconds = [three_digits(1e3 * each) for each in figures]
         rows.append([f"`{planner}`", len(cpu_s), *milliseconds, limit, late])
-    headings = ("planner", "decisions", "p50, ms", "p95", "p99", "most", "limit, s", "late")
+    headings = ("planner", "decisions", "p50, ms", "p95", "p99", "most", "meant, s", "late")
     return Finding(decisions + len(errors(results)), failed, markdown(headings, rows))
 
 
 ROW = Row(
     "R7",
     "Decision times, by processor time",
-    "decisions with a clock",
-    f"a planner with a clock takes no more than {MOST:g} times its limit, on one thread",
+    "decisions of counted work",
+    f"a planner that counts its work takes no more than {MOST:g} times what is meant, on one "
+    "thread",
     trials,
     finding,
     lambda quick: f"towns of two UAS and twelve waypoints from {FIRST_SEED} on",
     "Times on the clock, which say something on a quiet machine only (`benchmarks/planner.py`); "
-    "compilation and the search before take-off; and, of planners without a clock, any claim. On a "
-    "busy machine a planner with a clock does less within its limit.",
+    "compilation and the search before take-off; and, of planners that do not count their work, "
+    "any claim.",
 )

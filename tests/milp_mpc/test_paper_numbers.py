@@ -14,7 +14,7 @@ from uas_coverage_env.vehicle.params import return_threshold
 
 def test_the_village_and_the_options_have_the_numbers_of_the_papers_table():
     village, options = load_scenario("village"), MilpMpcPaper.Options()
-    assert (options.horizon, options.order) == (18, 4)
+    assert (options.horizon, options.taylor_order) == (18, 4)
     assert (options.physical_sides, options.obstacle_sides, options.waypoint_sides) == (8, 8, 4)
     assert (village.dt_s, village.max_steps) == (1.0, 500)
     assert (len(village.uas), len(village.waypoints)) == (2, 49)

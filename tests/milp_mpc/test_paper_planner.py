@@ -140,7 +140,7 @@ def test_what_departs_from_the_paper_is_an_option_that_is_off():
 
 def test_sides_order_and_horizon_reach_the_problem():
     chosen = {"physical_sides": 12, "obstacle_sides": 6, "waypoint_sides": 8, "horizon": 2}
-    problem = first_problem(paper(**chosen, order=2, limits="outer"))
+    problem = first_problem(paper(**chosen, taylor_order=2, limits="outer"))
     assert (problem.physical_sides, problem.limit_sides) == (12, 12)
     assert (problem.obstacle_sides, problem.waypoint_sides) == (6, 8)
     assert (problem.horizon, problem.order, problem.outer_limits) == (2, 2, True)
@@ -234,7 +234,7 @@ def test_what_moves_may_be_jumped_over_unless_corner_cutting_is_asked_for():
     assert allowed == [True, False]
 
 
-@pytest.mark.parametrize("options", [{"horizon": 2}, {"order": 2, "horizon": 6}])
+@pytest.mark.parametrize("options", [{"horizon": 2}, {"taylor_order": 2, "horizon": 6}])
 def test_short_horizons_and_low_orders_fly(options):
     scenario = field()
     world, planner = World(scenario), paper(scenario, **options)
@@ -296,7 +296,8 @@ def test_where_the_time_is_up_the_rest_of_the_last_plan_is_flown(monkeypatch):
         ({"gap": "2"}, "gap"),
         ({"time_limit_s": "0"}, "time_limit_s"),
         ({"horizon": "1"}, "horizon"),
-        ({"order": "1"}, "order"),
+        ({"taylor_order": "1"}, "taylor_order"),
+        ({"order": "4"}, "taylor_order"),
         ({"physical_sides": "6"}, "physical_sides"),
         ({"solver": "scip", "threads": "2"}, "give threads=1"),
     ],

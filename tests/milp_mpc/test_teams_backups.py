@@ -16,7 +16,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import short_s
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
-from uas_coverage_env.planning.backup import braked
+from uas_coverage_env.planning.backup.course import braked
 from uas_coverage_env.vehicle import compile_vehicle
 from uas_coverage_env.vehicle.layout import DOD, PHI, THETA, VX, VZ, WX
 from uas_coverage_env.vehicle.range import dod_per_s

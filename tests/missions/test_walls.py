@@ -17,7 +17,7 @@ from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight import load_planner
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.attempts import Attempts
-from uas_coverage_env.planning.backup import brake
+from uas_coverage_env.planning.backup.braking import brake
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import compile_vehicle

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from uas_coverage_env.planning.backup import Course, Supervisor, are_apart
+from uas_coverage_env.planning.backup.course import Course, are_apart
+from uas_coverage_env.planning.backup.supervisor import Supervisor
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
 from uas_coverage_env.vehicle import layout as S
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from backup_worlds import straight
 
-from uas_coverage_env.planning.backup import Supervisor, are_apart, braked
+from uas_coverage_env.planning.backup.course import are_apart, braked
+from uas_coverage_env.planning.backup.supervisor import Supervisor
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
 from uas_coverage_env.vehicle import layout as S
 

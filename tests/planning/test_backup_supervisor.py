@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from backup_worlds import BRAKING, World, straight, supervisor_of
 
-from uas_coverage_env.planning.backup import are_apart, braked
+from uas_coverage_env.planning.backup.course import are_apart, braked
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
 from uas_coverage_env.vehicle import layout as S
 

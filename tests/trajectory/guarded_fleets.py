@@ -8,7 +8,7 @@ from small_worlds import meadow
 from uas_coverage_baselines.trajectory.safeguard import Safeguard
 
 from uas_coverage_env.mission import WorldView
-from uas_coverage_env.planning.backup import braked
+from uas_coverage_env.planning.backup.course import braked
 from uas_coverage_env.vehicle.layout import VX, VZ
 
 PLACES = ((40.0, 60.0, -20.0), (40.0, 100.0, -20.0), (40.0, 140.0, -20.0))

@@ -4,7 +4,7 @@ import numpy as np
 from uas_coverage_baselines.trajectory.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.trajectory.program import PlannedFlight
 
-from uas_coverage_env.planning.backup import Course
+from uas_coverage_env.planning.backup.course import Course
 from uas_coverage_env.vehicle.layout import DOD, N_STATES, VX, VZ
 
 NOWHERE, NONE = np.zeros((0, 3)), np.zeros(0)

@@ -14,7 +14,7 @@ from uas_coverage_baselines.trajectory.course import (
     trouble_alone,
 )
 
-from uas_coverage_env.planning.backup import braked
+from uas_coverage_env.planning.backup.course import braked
 from uas_coverage_env.vehicle import layout as S
 
 KEEP_M = 2 * 0.36 + 5.0  # of two UAS in the meadow

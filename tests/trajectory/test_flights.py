@@ -11,7 +11,7 @@ from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
 from uas_coverage_baselines.trajectory.work import done
 
 from uas_coverage_env.geometry.segments import segment_clearance
-from uas_coverage_env.planning.backup import brake
+from uas_coverage_env.planning.backup.braking import brake
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.vehicle.layout import PHI, THETA, VX, VZ, WX
 

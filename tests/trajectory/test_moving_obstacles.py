@@ -15,7 +15,7 @@ from uas_coverage_baselines.trajectory.space import (
     spare_of_rules_m,
 )
 
-from uas_coverage_env.planning.backup import apart_m
+from uas_coverage_env.planning.backup.course import apart_m
 from uas_coverage_env.vehicle.layout import VX, VZ
 
 UAS_M, MARGIN_M = 0.36, 1.0

@@ -71,7 +71,8 @@ TRAJECTORY = Reserve(
 )
 TRAJECTORY_WITH_ROOM = TRAJECTORY._replace(
     of="the same where the plant is not the model: flights are slower, and come some steps later",
-    measured="`uas-coverage compare --planners trajectory --dynamics nonlinear`; "
+    measured="`uas-coverage compare --scenarios test --planners trajectory --seeds 0:1 "
+    "--dynamics nonlinear --out nonlinear`; "
     "the share was chosen by hand",
     time_share=0.91,
 )
@@ -90,7 +91,8 @@ LEARNED_ROUTE = TRAJECTORY._replace(
 ORDER_GUIDE = Reserve(
     "the order of `milp-mpc` (`order=search`, and in wind): somewhat more than `MILP_RESERVE` and "
     "`MILP_BRAKING_S` hold back",
-    "`uas-coverage compare --planners milp-mpc`; chosen by hand",
+    "`uas-coverage compare --scenarios test --planners milp-mpc --seeds 0:1 --out test`; "
+    "chosen by hand",
     kept_s=25.0,
     landing_s=4.0,
 )

@@ -5,6 +5,7 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, PAPER_OCP, Block, for
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
 from uas_coverage_baselines.milp_mpc.paper_planner import MilpMpcPaper
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc
+from uas_coverage_baselines.milp_mpc.search.row_prices import row_prices
 
 __all__ = [
     "OCP",
@@ -16,4 +17,5 @@ __all__ = [
     "PlanningProblem",
     "Variables",
     "formulate",
+    "row_prices",
 ]

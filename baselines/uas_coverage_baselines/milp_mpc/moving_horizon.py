@@ -52,7 +52,8 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self.options, self._given = options, tuple(checked(block) for block in blocks)
         self.blocks = (*self._given, *(block_named(name) for name in options.blocks))
         self.last_decision: Decision | None = None
-        self.plan: Plan | None = None  # what is left of the last plan, beginning now
+        self.last_plan: Plan | None = None  # of the last decision, as it was made
+        self.plan: Plan | None = None  # what is left of it, beginning now
         self._backup: Plan | None = None  # likewise, ending in a hover
 
     @abstractmethod
@@ -106,7 +107,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         self._steering: Steering | None = None
         if stated and self.options.in_wind == "guidance":
             self._steering = Steering(brief, self.options, seed)
-        self.plan = self._backup = None
+        self.last_plan = self.plan = self._backup = None
         self._round_robin = RoundRobin()
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
@@ -161,6 +162,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
             reason = reason or next(iter(reasons), None)
         if plan is None or backup is None:
             return self._hover(swarm, reason)
+        self.last_plan = plan
         self.plan, self._backup = plan.advanced(), backup.advanced()
         paths = {name: path for name, path in plan.positions().items() if name in swarm.active}
         gap = None if reason else plan.relative_gap()

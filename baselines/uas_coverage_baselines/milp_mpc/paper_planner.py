@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
 
@@ -41,6 +41,8 @@ _ROUNDING_M = 1e-5  # a solution keeps its rows to 2e-6, and a breach is one by 
 class PaperOptions(ModeOptions):
     """Options of `milp-mpc-paper`: Table I, and where the paper is silent what is closest to it."""
 
+    GONE: ClassVar[Mapping[str, str]] = {**ModeOptions.GONE, "order": "it is taylor_order"}
+
     formulation: str = Field(
         default="clique",
         description="how the rows are written, all with the same optimum: "
@@ -61,7 +63,7 @@ class PaperOptions(ModeOptions):
     threads: int = Field(default=1, ge=1, le=64, description="of the solver")
     horizon: int = Field(default=18, ge=2, le=60, description="N, steps of the prediction")
     in_wind: Literal["guidance", "wrenches"] = with_default(ModeOptions, "in_wind", "wrenches")
-    order: int = Field(default=4, ge=2, le=8, description="N_dis of the Taylor series")
+    taylor_order: int = Field(default=4, ge=2, le=8, description="N_dis of the Taylor series")
     physical_sides: int = Field(
         default=8, ge=4, le=64, multiple_of=4, description="H_P of the physical constraints"
     )
@@ -97,7 +99,7 @@ class PaperOptions(ModeOptions):
             "physical_sides": self.physical_sides,
             "limit_sides": self.physical_sides,
             "outer_limits": self.limits == "outer",
-            "order": self.order,
+            "order": self.taylor_order,
             "corners_of_all": self.corner_cutting == "all",
             "prune": FORMULATIONS[self.formulation].prune,
         }

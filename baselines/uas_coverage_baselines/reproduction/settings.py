@@ -29,7 +29,7 @@ def _option(name: str, default: float | None = None) -> Callable[[Flight], tuple
 FLOWN: Mapping[str, Callable[[Flight], tuple[float, ...]]] = {
     "N": _option("horizon"),
     "dt": lambda flight: (flight.scenario.dt_s,),
-    "N_dis": _option("order", _ORDER),
+    "N_dis": _option("taylor_order", _ORDER),
     "N_step,max": lambda flight: (float(flight.scenario.max_steps),),
     "N_UAS": lambda flight: (float(len(flight.scenario.uas)),),
     # the paper counts what moves among the obstacles

@@ -9,9 +9,9 @@ from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.flight_model import excess, fly_inputs, reduced_state
 from uas_coverage_baselines.trajectory.program import PlannedFlight
 from uas_coverage_baselines.trajectory.space import spare_of_rules_m
-from uas_coverage_env.planning import backup
-from uas_coverage_env.planning.backup import Course, brake
-from uas_coverage_env.planning.backup.course import ROUNDING_M
+from uas_coverage_env.planning.backup import course as backup_course
+from uas_coverage_env.planning.backup.braking import brake
+from uas_coverage_env.planning.backup.course import ROUNDING_M, Course
 from uas_coverage_env.vehicle import layout as S
 
 FloatArray = NDArray[np.float64]
@@ -58,7 +58,7 @@ def trouble_alone(fleet: Fleet, uas: int, x: FloatArray, flight: PlannedFlight) 
 
 def are_apart(fleet: Fleet, i: int, j: int, one: Course, other: Course) -> bool:
     """Whether two courses that begin now keep the distance of the rules, or come no nearer."""
-    return backup.are_apart(one, other, fleet.keep_m(i, j))
+    return backup_course.are_apart(one, other, fleet.keep_m(i, j))
 
 
 def hover_inputs(fleet: Fleet, uas: int, x: FloatArray) -> FloatArray:

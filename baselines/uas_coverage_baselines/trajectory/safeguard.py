@@ -24,7 +24,7 @@ from uas_coverage_env.entities.commands import GO_TO, HOME, WRENCH
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.mission import Range, WorldView
-from uas_coverage_env.planning.backup import Supervisor
+from uas_coverage_env.planning.backup.supervisor import Supervisor
 from uas_coverage_env.vehicle.layout import DELTA_THRUST
 from uas_coverage_env.world import SwarmState
 

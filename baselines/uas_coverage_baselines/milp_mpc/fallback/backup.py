@@ -34,7 +34,8 @@ from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
-from uas_coverage_env.planning.backup import Course, Supervisor
+from uas_coverage_env.planning.backup.course import Course
+from uas_coverage_env.planning.backup.supervisor import Supervisor
 from uas_coverage_env.vehicle import compile_vehicle
 
 FloatArray = NDArray[np.float64]

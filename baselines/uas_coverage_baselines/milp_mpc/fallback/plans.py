@@ -16,7 +16,7 @@ from uas_coverage_baselines.milp_mpc.fallback.backup import course_of
 from uas_coverage_baselines.milp_mpc.model.appraisal import Appraisal
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
-from uas_coverage_env.planning.backup import Course, braked
+from uas_coverage_env.planning.backup.course import Course, braked
 from uas_coverage_env.vehicle import compile_vehicle
 
 FloatArray = NDArray[np.float64]

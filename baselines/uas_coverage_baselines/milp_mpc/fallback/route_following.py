@@ -27,7 +27,7 @@ from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.approach import carefully, with_free_aims
-from uas_coverage_env.planning.backup import Course, braked
+from uas_coverage_env.planning.backup.course import Course, braked
 from uas_coverage_env.planning.reserves import BRAKING_S, ROUTE_HOME_RESERVE
 from uas_coverage_env.vehicle import compile_vehicle, lpv_step
 from uas_coverage_env.vehicle import layout as S
