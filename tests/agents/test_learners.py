@@ -194,7 +194,7 @@ def test_a_policy_of_a_class_that_is_not_trusted_imports_nothing(own):
     assert "my_learners" not in sys.modules
 
 
-def test_masks_are_shown_and_what_is_remembered_is_given_back_to_whoever_takes_them(own):
+def test_masks_are_shown_and_what_is_remembered_is_given_back_to_learners_that_take_them(own):
     settings = tiny("my_learners:Choosy", "agent=each", scenario="medium")
     settings = settings.model_copy(
         update={"environment": settings.environment.model_copy(update={"action": "waypoint"})}

@@ -39,7 +39,7 @@ def test_what_a_planner_says_of_who_flew_is_kept_in_the_record_and_in_its_direct
     assert [decision.flown_by for decision in Flight.load(tmp_path).decisions] == said
 
 
-def test_a_waypoint_that_is_named_is_flown_to_by_guidance_whoever_says_what():
+def test_a_waypoint_that_is_named_is_flown_to_by_guidance_for_every_planner():
     flight = flown(Says(by=("tour",), guided=(0, 2)))
     assert [decision.flown_by for decision in flight.decisions] == [
         ("tour", "guidance"), (), ("guidance",), (),

@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 from toy_problems import (
+    BY_NODES,
     S500,
     box,
     flight,
@@ -34,20 +35,9 @@ from uas_coverage_baselines.milp_mpc.solvers.interface import SolveStatus
 from uas_coverage_env.geometry import sphere_faces
 from uas_coverage_env.vehicle.layout import PHI, THETA, VX, WY
 
-BY_NODES = Effort(teams=4)
 BY_TEAM = dataclasses.replace(BY_NODES, joint=None)
 THOROUGH = Effort(work=20.0, teams=4)
 OPTIMAL = SolverLimits(relative_gap=1e-6, absolute_gap=1e-5)
-
-
-@pytest.fixture(scope="module")
-def problem():
-    return two_around_a_tower()
-
-
-@pytest.fixture(scope="module")
-def by_nodes(problem):
-    return planned(decide(problem, None, 1.0, BY_NODES))
 
 
 @pytest.fixture(scope="module")

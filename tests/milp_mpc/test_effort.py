@@ -5,24 +5,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from toy_problems import planned, two_around_a_tower
+from toy_problems import BY_NODES, planned
 from uas_coverage_baselines.milp_mpc.search import team_search
-from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
+from uas_coverage_baselines.milp_mpc.search.decision import decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import NARROW
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
-
-BY_NODES = Effort(teams=4)
-
-
-@pytest.fixture(scope="module")
-def problem():
-    return two_around_a_tower()
-
-
-@pytest.fixture(scope="module")
-def by_nodes(problem):
-    return planned(decide(problem, None, 1.0, BY_NODES))
 
 
 def test_a_share_of_the_work_is_the_joint_programs_once_each_uas_has_a_plan(

@@ -190,7 +190,7 @@ def test_a_uas_that_has_to_fly_home_is_not_sent_elsewhere():
 
 
 def test_the_way_home_goes_before_a_route_that_would_cross_it():
-    # both want through one place: whoever flies home is served first, whatever the order
+    # both want through one place: a UAS that flies home goes first, whatever the order
     scene = Scene()
     x = scene.swarm.x.copy()
     x[0, :3], x[1, :3] = (80.0, 52.0, -10.0), (88.0, 60.0, -10.0)

@@ -6,6 +6,7 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.ocp import OCP, formulate, shared_variables
 from uas_coverage_baselines.milp_mpc.model.problem import MovingHull, Plan, PlanningProblem, Target
+from uas_coverage_baselines.milp_mpc.search.decision import Effort
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
@@ -15,6 +16,7 @@ from uas_coverage_env.vehicle import compile_vehicle, linear_model, load_vehicle
 from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
 from uas_coverage_env.vehicle.layout import DOD, N_INPUTS, N_STATES, VX, VZ
 
+BY_NODES = Effort(teams=4)
 S500 = load_vehicle("s500_v2")
 TO_OPTIMALITY = SolverLimits(relative_gap=1e-9, absolute_gap=1e-7)
 

@@ -118,7 +118,7 @@ def rollout(
     assistants: Assistants = getattr(planner, "assistants", Assistants())
     # no plan is verified against what pushes back, nor one of legs against what moves
     by_legs = scenario.execution is not None
-    # whoever looks no farther than the next waypoint is called home for a fresh pack
+    # a planner that looks no farther than the next waypoint is called home for a fresh pack
     called = swaps_alone(scenario) and not hasattr(planner, "is_idle")
     uncertain = _is_uncertain(scenario, disturbances) or called
     if return_mode is None:

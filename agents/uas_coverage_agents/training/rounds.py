@@ -157,7 +157,7 @@ def train(
 
     Args:
         jobs: Directory -> training.
-        validation: Who works, and who keeps the flights; None: this process, and nobody.
+        validation: Who works, and who keeps the flights; None: this process, and they are not kept.
         on_progress: Told after each round.
 
     Returns:

@@ -244,7 +244,7 @@ def names_an_object(value: Any) -> bool:
 def authors_own(settings: LearnerSettings) -> list[str]:
     """The texts MODULE:NAME of a training that are no class that an installed package announces.
 
-    To make what they name runs code that whoever wrote the settings has chosen.
+    To make what they name runs code that the author of the settings has chosen.
     """
     announced = {*_announced(), *(entry.value for entry in _announced().values())}
     found: list[str] = []

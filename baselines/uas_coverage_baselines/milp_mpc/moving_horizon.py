@@ -214,7 +214,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def _hover(self, swarm: SwarmState, reason: Reason | None) -> dict[str, Command]:
         """Brake and hold with the vehicle's inner loop: there is neither plan nor backup."""
-        self.plan = self._backup = None
+        self.last_plan = self.plan = self._backup = None
         paths = {name: swarm.x[[swarm.names.index(name)], 0:3] for name in swarm.active}
         self.last_decision = Decision(paths, fallback=True, reason=reason)
         return hovering(swarm, self.mode)
