@@ -50,4 +50,6 @@ def flight_of(inputs):
     """A planned flight of which nothing but the inputs (N, 3) matters."""
     inputs = np.array(inputs, float)
     n = len(inputs)
-    return PlannedFlight(np.zeros(0, np.int64), np.zeros((n + 1, 10)), inputs, 0.0, np.zeros(0))
+    return PlannedFlight(
+        np.zeros(0, np.int64), np.zeros((n + 1, 10)), inputs, np.zeros((n, 10)), 0.0, np.zeros(0)
+    )

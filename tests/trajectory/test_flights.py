@@ -2,11 +2,14 @@ import numpy as np
 import pytest
 from small_fleets import TOWER, every_waypoint, field, fleet_of, quickest, start_of
 from small_worlds import box, meadow, waypoint
-from uas_coverage_baselines.trajectory import retiming
 from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
 from uas_coverage_baselines.trajectory.first_guess import first_flight
 from uas_coverage_baselines.trajectory.fleet import Moment, make_way
-from uas_coverage_baselines.trajectory.retiming import repair, retimed, shifted, stretches
+from uas_coverage_baselines.trajectory.retiming import (
+    retimed,
+    stretches,
+    worth,
+)
 from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
 from uas_coverage_baselines.trajectory.work import done
 
@@ -76,19 +79,16 @@ def test_retiming_makes_a_flight_much_shorter_than_its_first_guess(flown):
     assert flight.steps < 0.85 * first.steps
 
 
-def test_a_step_that_is_missing_in_the_shortest_stretch_is_taken_from_the_longest(
-    flown, monkeypatch
-):
-    # each sphere is passed most deeply where it is visited
-    monkeypatch.setattr(retiming, "deepest_visits", lambda program, flight, route: flight.visits)
+def test_shadow_prices_name_the_stretch_in_which_time_is_missing(flown):
+    """A step taken from a tight stretch is worth most there."""
     fleet, swarm, route, flight = flown
     order, lengths = stretches(flight)
-    long, short = int(np.argmax(lengths)), int(np.argmin(lengths))
-    visits = shifted(shifted(flight.visits, order, short, -1), order, long, 1)
-    program, start = fleet.programs[0], start_of(swarm)
-    squeezed = retimed(program, start, route, flight, visits, flight.steps)
-    assert not squeezed.is_clear
-    assert done(repair(program, start, route, squeezed, 12)).is_clear
+    longest = int(np.argmax(lengths[:-1]))
+    visits = flight.visits.copy()
+    visits[order[longest:]] -= 3
+    squeezed = retimed(fleet.programs[0], start_of(swarm), route, flight, visits, flight.steps - 3)
+    assert squeezed.violation > 0.5
+    assert int(np.argmax(worth(squeezed).gain)) == longest
 
 
 def test_a_flight_that_hits_something_is_found_out(flown):

@@ -130,6 +130,27 @@ def test_its_states_follow_from_its_inputs(model):
     np.testing.assert_allclose(following, solution.x[1:], atol=1e-4)
 
 
+def test_costates_are_what_a_change_of_the_start_costs(model):
+    """The derivative of the optimal cost, by differences."""
+    steps, rows = 8, goal_rows(8, [90.0, 30.0, -9.0])
+    at_rest = solved(model, rows, steps)
+
+    def cost(solution):
+        away = solution.x[rows.stage[0], POSITION] - rows.vector[0]
+        position = 0.5 * (away @ away - rows.bound[0] ** 2) / rows.bound[0]
+        speed = solution.x[-1, VELOCITY]
+        slow = 0.5 * (speed @ speed - rows.bound[1] ** 2) / rows.bound[1]
+        inputs = 0.5 * np.sum(model.input_weight * solution.u**2)
+        return inputs + max(position, 0.0) + 4.0 * max(slow, 0.0)
+
+    for state in (0, 1, 4, 8):
+        start = np.zeros(10)
+        start[state] = 1e-3
+        change = (cost(solved(model, rows, steps, start)) - cost(at_rest)) / 1e-3
+        expected = (model.A.T @ at_rest.costate[0])[state]
+        assert change == pytest.approx(expected, rel=2e-2, abs=1e-3)
+
+
 def test_what_cannot_be_reached_is_reached_as_nearly_as_possible(model):
     near = solved(model, goal_rows(10, [50.0, 0.0, -5.0]), 10)
     far = solved(model, goal_rows(10, [500.0, 0.0, -5.0]), 10)
@@ -160,14 +181,15 @@ def test_a_newton_step_solves_the_dense_system_of_its_optimality_conditions(mode
     R = rng.uniform(0.5, 2.0, (N, n_u))
     q, r, d = rng.normal(size=(N + 1, n_x)), rng.normal(size=(N, n_u)), rng.normal(size=(N, n_x))
     factors = Factors(np.zeros((N + 1, n_x, n_x)), np.zeros((N, n_u, n_x)), np.zeros((N, n_u, n_u)))
-    dx, du = np.zeros((N + 1, n_x)), np.zeros((N, n_u))
+    dx, du, costate = np.zeros((N + 1, n_x)), np.zeros((N, n_u)), np.zeros((N, n_x))
     factor(model.A, model.B, Q, R, factors)
-    newton_step(model.A, model.B, factors, q, r, d, dx, du)
-    onward = np.zeros(n_x)  # what a change of the next state costs
-    for n in reversed(range(N)):
+    newton_step(model.A, model.B, factors, q, r, d, dx, du, costate)
+    for n in range(N):
         following = model.A @ dx[n] + model.B @ du[n] + d[n]
         np.testing.assert_allclose(dx[n + 1], following, rtol=1e-8, atol=1e-8)
-        costate = Q[n + 1] @ dx[n + 1] + q[n + 1] + model.A.T @ onward
-        inputs = R[n] * du[n] + r[n] + model.B.T @ costate
+        inputs = R[n] * du[n] + r[n] + model.B.T @ costate[n]
         np.testing.assert_allclose(inputs, 0.0, atol=1e-6)
-        onward = costate
+        onward = model.A.T @ costate[n + 1] if n + 1 < N else 0.0
+        np.testing.assert_allclose(
+            Q[n + 1] @ dx[n + 1] + q[n + 1] + onward, costate[n], rtol=1e-6, atol=1e-6
+        )

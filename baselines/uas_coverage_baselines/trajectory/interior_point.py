@@ -46,6 +46,7 @@ class Solution(NamedTuple):
     Attributes:
         x: (N+1, 10) states.
         u: (N, 3) inputs.
+        costate: (N, 10) what a change of the states 1..N costs.
         violation: (m,) of the soft rows.
         iterations: How many were needed.
         converged: Whether residuals and complementarity are small.
@@ -53,6 +54,7 @@ class Solution(NamedTuple):
 
     x: FloatArray
     u: FloatArray
+    costate: FloatArray
     violation: FloatArray
     iterations: int
     converged: bool
@@ -304,6 +306,7 @@ def _solve(model, loose, rows, x, u, iterations, complementarity):
     Q, R = np.zeros((n_stages + 1, N_X, N_X)), np.zeros((n_stages, N_U))
     q, r = np.zeros((n_stages + 1, N_X)), np.zeros((n_stages, N_U))
     dx, du = np.zeros((n_stages + 1, N_X)), np.zeros((n_stages, N_U))
+    costate, new_costate = np.zeros((n_stages, N_X)), np.zeros((n_stages, N_X))
     n_products = n_stages * (N_HARD + _BOUNDS) + 2 * n_soft
     converged, done = False, 0
     for done in range(iterations):
@@ -327,7 +330,7 @@ def _solve(model, loose, rows, x, u, iterations, complementarity):
         primal, dual = 1.0, 1.0
         for phase in range(2):
             _gradient(model, loose, rows, x, u, at, values, aside, target, q, r)
-            newton_step(model.A, model.B, factors, q, r, values.dynamics, dx, du)
+            newton_step(model.A, model.B, factors, q, r, values.dynamics, dx, du, new_costate)
             primal, dual = _changes(
                 model, loose, rows, x, dx, du, at, values, aside, target, change
             )
@@ -338,8 +341,9 @@ def _solve(model, loose, rows, x, u, iterations, complementarity):
         primal, dual = min(1.0, _STEP * primal), min(1.0, _STEP * dual)
         x += primal * dx
         u += primal * du
+        costate += dual * (new_costate - costate)
         _move(at, change, primal, dual)
-    return violations(rows, x), done, converged
+    return costate, violations(rows, x), done, converged
 
 
 def solve(
@@ -369,5 +373,7 @@ def solve(
     if loose is None:
         loose = np.ones(len(x))
     x, u = x.copy(), u.copy()
-    violation, done, converged = _solve(model, loose, rows, x, u, iterations, complementarity)
-    return Solution(x, u, violation, int(done), bool(converged))
+    costate, violation, done, converged = _solve(
+        model, loose, rows, x, u, iterations, complementarity
+    )
+    return Solution(x, u, costate, violation, int(done), bool(converged))

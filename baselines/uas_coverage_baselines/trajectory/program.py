@@ -105,6 +105,7 @@ class PlannedFlight:
         visits: (K,) step of each waypoint of the route.
         x: (N+1, 10) states of the program.
         u: (N, 3) inputs.
+        costate: (N, 10) what a change of the states 1..N costs.
         violation: Of the soft rows, summed, but for visits that are inside their spheres still;
             inf where the program was not solved.
         missed_m: (K,) how far each visit is outside of its sphere.
@@ -113,6 +114,7 @@ class PlannedFlight:
     visits: IntArray
     x: FloatArray
     u: FloatArray
+    costate: FloatArray
     violation: float
     missed_m: FloatArray
 
@@ -122,6 +124,7 @@ class PlannedFlight:
             self.visits[visits] - steps,
             self.x[steps:],
             self.u[steps:],
+            self.costate[steps:],
             self.violation,
             self.missed_m[visits],
         )
@@ -217,12 +220,12 @@ class FlightProgram:
             missed_m = found.violation[: len(route)]
             forgiven = self._is_visited(route, missed_m)
             violation = float(found.violation.sum() - missed_m[forgiven].sum())
-            flight = PlannedFlight(visits, x, u, violation, missed_m)
+            flight = PlannedFlight(visits, x, u, found.costate, violation, missed_m)
             if violation > _HOPELESS:
                 break
             if self.spare_m(flight.path_m) > -TOLERANCE_M:
                 break
-            flight = PlannedFlight(visits, x, u, max(violation, 0.5), missed_m)
+            flight = PlannedFlight(visits, x, u, found.costate, max(violation, 0.5), missed_m)
         return flight
 
     def allows(self, route: IntArray, flight: PlannedFlight) -> bool:
@@ -327,8 +330,11 @@ class FlightProgram:
 
 
 def _unsolved(visits: IntArray, guess: FloatArray) -> PlannedFlight:
-    nothing = np.zeros((len(guess) - 1, 3))
-    return PlannedFlight(visits, guess, nothing, np.inf, np.full(len(visits), np.inf))
+    n_steps = len(guess) - 1
+    nothing = np.zeros((n_steps, 10))
+    return PlannedFlight(
+        visits, guess, np.zeros((n_steps, 3)), nothing, np.inf, np.full(len(visits), np.inf)
+    )
 
 
 def _balls(

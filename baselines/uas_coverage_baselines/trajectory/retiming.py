@@ -1,10 +1,9 @@
 """The quickest flight along a route: visits are moved in time until no step can be spared.
 
-Steps are taken away as long as a flight is left that violates nothing: first in all stretches
-between two visits at once, then one by one. Where something is violated, visits go to where the
-flight passes their spheres most deeply, and steps from the longest stretches to the shortest. What
-costates say a step is worth in a stretch was no better a guide than chance. The effort is counted
-in programs solved.
+The costates of the program say what a step more or less is worth in every stretch between two
+visits. Steps are moved from where they are worth least to where they are worth most, and one is
+taken away as long as a flight is left that violates nothing: first in all stretches at once, then
+one by one. The effort is counted in programs solved.
 """
 
 from __future__ import annotations
@@ -27,7 +26,37 @@ _MENDABLE = 4.0
 _REPAIRS = 12
 _STRETCHES = 3  # the longest, of which one is made shorter
 _LONG_STEPS = 400
-_LONG_SHARE = 0.4  # of the longest stretch
+
+
+class Worth(NamedTuple):
+    """What time is worth in the stretches between visits, in order of time.
+
+    Attributes:
+        order: (K,) rows of the visits, by their step.
+        gain: (K+1,) what a step more takes off the violation.
+        cost: (K+1,) what a step less adds to it; inf where there is none to spare.
+    """
+
+    order: IntArray
+    gain: FloatArray
+    cost: FloatArray
+
+
+def worth(flight: PlannedFlight) -> Worth:
+    """The shadow prices of time: what the costates say of one step along the flight."""
+    order = np.argsort(flight.visits, kind="stable")
+    # holding the state of a step for one more: the change of state that this saves, priced
+    price = -np.einsum("ij,ij->i", flight.costate, np.diff(flight.x, axis=0))
+    gain, cost = np.zeros(len(order) + 1), np.full(len(order) + 1, np.inf)
+    begin = 0
+    for k, end in enumerate([*flight.visits[order].tolist(), flight.steps]):
+        part = price[begin:end] if end > begin else price[max(end - 1, 0) : end]
+        if len(part):
+            gain[k] = part.max()
+            if end - begin > 1:
+                cost[k] = part.min()
+        begin = end
+    return Worth(order, gain, cost)
 
 
 def stretches(flight: PlannedFlight) -> tuple[IntArray, IntArray]:
@@ -113,7 +142,7 @@ def finished(
 def _coarse(
     program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight, until: int
 ) -> Work[PlannedFlight]:
-    """All stretches shorter at once; the long ones get their steps back first."""
+    """All stretches shorter at once; those in which time is dear get their steps back."""
     share, frozen = _FIRST_SHARE, np.zeros(len(route) + 1, bool)
     while share > _LAST_SHARE and program.solved < until:
         order, lengths = stretches(flight)
@@ -133,12 +162,12 @@ def _coarse(
                 new = yield from repair(program, start, route, new, 3)
             if new.is_clear:
                 break
-            left = lengths - less
-            long = (left >= _LONG_SHARE * left.max()) & (less > 0)
-            if not long.any():
-                long = less > 0
-            frozen |= long & (less <= 1)
-            less[long] //= 2
+            prices = worth(new).gain
+            dear = (prices >= 0.4 * prices.max()) & (less > 0)
+            if not dear.any():
+                dear = less > 0
+            frozen |= dear & (less <= 1)
+            less[dear] //= 2
         if new is not None and new.is_clear and new.steps < flight.steps:
             flight = new
         else:
@@ -173,17 +202,19 @@ def repair(
 
 
 def _candidates(program: FlightProgram, route: IntArray, flight: PlannedFlight) -> list[IntArray]:
-    """Visits to try: where the spheres are passed, then a step from long to short stretches."""
+    """Visits to try: where the spheres are passed, then a step from cheap to dear stretches."""
     result = []
     near = deepest_visits(program, flight, route)
     if (near != flight.visits).any():
         result.append(near)
-    order, lengths = stretches(flight)
-    by_length = np.argsort(-lengths, kind="stable")
-    longest, shortest = by_length[:2], by_length[-1]
-    for out, into in ((longest[0], shortest), (longest[0], longest[-1]), (longest[-1], shortest)):
-        if out != into and lengths[out] > 1:
-            result.append(shifted(shifted(flight.visits, order, into, 1), order, out, -1))
+    order, gain, cost = worth(flight)
+    into, out = np.argsort(-gain, kind="stable")[:3], np.argsort(cost, kind="stable")[:3]
+    pairs = sorted(
+        ((gain[i] - cost[o], int(i), int(o)) for i in into for o in out if i != o), reverse=True
+    )
+    for value, i, o in pairs[:4]:
+        if np.isfinite(value) and value >= -0.5:
+            result.append(shifted(shifted(flight.visits, order, i, 1), order, o, -1))
     return result
 
 

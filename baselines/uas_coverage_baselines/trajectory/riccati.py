@@ -114,7 +114,7 @@ def _invert(S, inverse):
 
 
 @allocating_kernel
-def newton_step(A, B, factors, q, r, d, dx, du):
+def newton_step(A, B, factors, q, r, d, dx, du, costate):
     """Solve for one right-hand side.
 
     Args:
@@ -126,6 +126,7 @@ def newton_step(A, B, factors, q, r, d, dx, du):
         d: (N, 10) residuals of the dynamics.
         dx: (N+1, 10) written.
         du: (N, 3) written.
+        costate: (N, 10) written: multipliers of the dynamics, of the states 1..N.
     """
     P, K, S_inverse = factors.P, factors.K, factors.S_inverse
     n_stages = r.shape[0]
@@ -171,3 +172,8 @@ def newton_step(A, B, factors, q, r, d, dx, du):
                 for j in range(i, high):
                     value += A[i, j] * dx[n, j]
                 dx[n + 1, i] = value
+        for i in range(N_X):
+            value = p[n + 1, i]
+            for j in range(N_X):
+                value += P[n + 1, i, j] * dx[n + 1, j]
+            costate[n, i] = value

@@ -14,7 +14,7 @@ from uas_coverage_baselines.trajectory.mission_plan import Planned
 from uas_coverage_baselines.trajectory.moving_obstacles import MovingObstacles
 from uas_coverage_baselines.trajectory.plan_in_force import PlanInForce
 from uas_coverage_baselines.trajectory.program import FlightProgram, PlannedFlight
-from uas_coverage_baselines.trajectory.retiming import repair, retimed, shifted, stretches
+from uas_coverage_baselines.trajectory.retiming import repair, retimed, shifted, worth
 from uas_coverage_baselines.trajectory.space import Body
 from uas_coverage_baselines.trajectory.steering import Failures
 from uas_coverage_baselines.trajectory.work import done
@@ -133,9 +133,9 @@ def tracked(
     visits = np.ceil(slower * rest.visits).astype(np.int64)
     new = retimed(program, start, route, rest, visits, int(np.ceil(slower * rest.steps)))
     for later in range(_MOST_LATER + 1):
-        if later:  # a step more in the longest stretch
-            order, lengths = stretches(new)
-            visits = shifted(new.visits, order, int(np.argmax(lengths)), 1)
+        if later:  # a step more where it is worth most
+            order, gain, _ = worth(new)
+            visits = shifted(new.visits, order, int(np.argmax(gain)), 1)
             new = retimed(program, start, route, new, visits, new.steps + 1)
         if not program.visits_all(route, new):
             new = done(repair(program, start, route, new, _REPAIRS))
