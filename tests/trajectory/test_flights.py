@@ -5,11 +5,7 @@ from small_worlds import box, meadow, waypoint
 from uas_coverage_baselines.trajectory.course import course_of, trouble_alone
 from uas_coverage_baselines.trajectory.first_guess import first_flight
 from uas_coverage_baselines.trajectory.fleet import Moment, make_way
-from uas_coverage_baselines.trajectory.retiming import (
-    retimed,
-    stretches,
-    worth,
-)
+from uas_coverage_baselines.trajectory.retiming import retimed, shifted, stretches, worth
 from uas_coverage_baselines.trajectory.space import Body, spare_of_rules_m
 from uas_coverage_baselines.trajectory.work import done
 
@@ -80,15 +76,20 @@ def test_retiming_makes_a_flight_much_shorter_than_its_first_guess(flown):
 
 
 def test_shadow_prices_name_the_stretch_in_which_time_is_missing(flown):
-    """A step taken from a tight stretch is worth most there."""
+    """Where three steps are taken from a stretch, its price is the highest of all."""
     fleet, swarm, route, flight = flown
     order, lengths = stretches(flight)
-    longest = int(np.argmax(lengths[:-1]))
-    visits = flight.visits.copy()
-    visits[order[longest:]] -= 3
-    squeezed = retimed(fleet.programs[0], start_of(swarm), route, flight, visits, flight.steps - 3)
-    assert squeezed.violation > 0.5
-    assert int(np.argmax(worth(squeezed).gain)) == longest
+    for squeezed in range(len(lengths)):
+        visits = shifted(flight.visits, order, squeezed, -3)
+        tight = retimed(fleet.programs[0], start_of(swarm), route, flight, visits, flight.steps - 3)
+        prices = worth(tight)
+        assert int(np.argmax(prices.gain)) == squeezed
+        assert prices.gain[squeezed] > 5.0
+        with_one_more = shifted(tight.visits, order, squeezed, 1)
+        helped = retimed(
+            fleet.programs[0], start_of(swarm), route, tight, with_one_more, tight.steps + 1
+        )
+        assert helped.violation < tight.violation - 1.0
 
 
 def test_a_flight_that_hits_something_is_found_out(flown):
