@@ -9,7 +9,7 @@ from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 
 FLOWN = read_problems(Path(__file__).parents[2] / "benchmarks" / "village_decisions.json")
-THOROUGH = Effort(work=2.0, threads=1)  # enough for the joint program of each
+THOROUGH = Effort(work=4.0, threads=1)  # enough for the joint program of each
 OBJECTIVES = {0: -51.77, 60: -85.66, 109: -22.84, 140: 1.58}
 """Step -> objective when this was written. Of two teams and without the joint program, those of
 steps 0 and 109 were -46.30 and -17.12."""

@@ -42,7 +42,7 @@ class Effort:
     """How much work a decision may take, counted in what every machine repeats.
 
     Attributes:
-        work: of the decision's programs (`work_of`); with 1 it takes a second of a quiet core.
+        work: of the decision's programs (`work_of`); with 1 it takes less than a second of a quiet core.
         threads: how many restricted programs are solved side by side; changes no result.
         teams: how many constructed teams are refined.
         at_once: how many UAS are planned for, at most; the others go on with what they have.
@@ -71,6 +71,7 @@ _AT_LEAST, _AT_MOST = 1.1, 2.0  # of the work: with which it is solved, with whi
 _WAVE = 4  # programs after which the work is counted, whatever the number of threads
 # 1 is 0.85 s of a quiet core (docs/solvers.md); the rest of a second is for all but programs
 _PER_ENTRY, _PER_ITERATION_AND_ROW = 6e-7, 3.5e-8
+_JOINT_DEARER = 3.0  # than its iterations say: cuts at the root, rows beyond the cache
 _PROGRAMS_EACH = 2  # at least, of a UAS that is planned for
 
 
@@ -112,7 +113,7 @@ class TeamSearch:
         if whole and not (self.problem.tours and self.problem.n_uas > 1):
             # its root takes an iteration a row, and it has about the rows of all own programs
             rows = sum(len(program.built.row_lower) for program in self._own.values())
-            self._joint = _PER_ITERATION_AND_ROW * rows**2
+            self._joint = _JOINT_DEARER * _PER_ITERATION_AND_ROW * rows**2
 
     def safe(self, uas: int, plans: Sequence[Plan]) -> list[Plan]:
         """Those of a UAS's plans that are clear of everything but the other UAS.
@@ -279,7 +280,7 @@ class TeamSearch:
         limits = SolverLimits(nodes=nodes, relative_gap=0.01, heuristics=False)
         solution = self._solved(program, limits, start)
         if solution is not None:
-            self.work += work_of(program, solution.iterations)
+            self.work += _JOINT_DEARER * work_of(program, solution.iterations)
             self._bound = solution.bound
             if solution.values is not None:
                 self._offer(replace(program.plan(solution), renewed=self.problem.names))
