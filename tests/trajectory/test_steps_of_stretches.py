@@ -75,6 +75,13 @@ def test_where_every_step_is_missing_somewhere_nothing_is_moved_and_few_are_trie
     assert program.solved == before, "there is nothing to mend"
 
 
+def test_no_step_is_taken_from_where_it_is_worth_more_than_where_it_goes():
+    program = Program(5, 5)
+    short = program.flight(4, 2)
+    assert done(repair(program, START, ROUTE[:1], short, 12)) is short
+    assert program.solved == 1, "from the first stretch to the second, which helps as much"
+
+
 def test_a_repair_has_so_many_tries():
     program = Program(9, 1)
     begun = program.flight(4, 10)
@@ -141,3 +148,15 @@ def test_all_stretches_are_made_shorter_at_once_down_to_what_each_asks_for(monke
     assert begun.flight.steps <= 133 + 12
     assert (np.array(lengths_of(begun.flight)) >= program.needed).all()
     assert begun.left == 60 - program.solved
+
+
+def test_a_stretch_in_which_time_is_dear_gets_its_steps_back_and_no_other_does(monkeypatch):
+    program = Program(60, 1, 1, 1)
+
+    def first(*_):
+        yield from ()
+        return program.flight(60, 60, 60, 60)
+
+    monkeypatch.setattr(retiming, "first_flight", first)
+    begun = done(draft(program, None, 0, START, ROUTE, 6))
+    assert lengths_of(begun.flight) == [60, 45, 45, 45]

@@ -147,10 +147,11 @@ def test_a_flight_from_elsewhere_may_end_up_to_four_steps_later(under_way, monke
     assert tried == [planned.flight.steps + later for later in range(5)]
 
 
-def test_a_uas_that_flies_as_planned_keeps_no_other_from_being_tracked():
+@pytest.mark.parametrize("off_m", [0.0, 5.0])
+def test_whatever_another_uas_flies_one_that_was_pushed_is_tracked(off_m):
     flown = Flown(planned_in(field(starts_m=((100.0, 100.0, -1.0), (20.0, 180.0, -1.0)))))
     still = flown.planned.flight.after(0, np.zeros(0, np.int64))
-    waits = Planned(still.visits, still, hover(flown.first.x[1, :3]))
+    waits = Planned(still.visits, still, hover(flown.first.x[1, :3] + (off_m, 0.0, 0.0)))
     again, _ = flown.follow(0.2, beside={1: waits})
     assert flown.tracking.is_disturbed
     assert again is not flown.planned
