@@ -99,3 +99,15 @@ def test_a_team_says_which_uas_have_a_new_plan():
     search.collect(1, [plans[1]])
     search.combine([[plans[0]], [plan_of(problem, 1, (0.0, 1.0, 0.0), [])]])
     assert planned(search.outcome).renewed == ("b",)
+
+
+def test_a_plan_into_the_ground_is_not_kept_whatever_program_it_comes_from():
+    problem = two()
+    plan = plan_of(problem, 0, (0.0, 1.0, 0.0), [])
+    low = plan.x.copy()
+    low[0, 3, 2] = 5.0
+    search = TeamSearch(problem, EFFORT, time.perf_counter())
+    search.collect(0, [dataclasses.replace(plan, x=low)])
+    assert not search.has_plan(0)
+    search.collect(0, [plan])
+    assert search.has_plan(0)

@@ -101,7 +101,8 @@ def test_a_search_ends_with_its_budget():
     begun = program.flight(9, 9, 9, 9)
     assert done(shorten(program, START, ROUTE, begun, 0)) is begun
     found = done(shorten(program, START, ROUTE, begun, 5))
-    assert (program.solved, found.steps) == (5, 31)
+    assert program.solved == 5
+    assert lengths_of(found) == [7, 8, 8, 8], "of the longest stretch first, a step each time"
 
 
 @pytest.mark.parametrize(("steps", "share"), [(100, 1.0), (400, 1.0), (800, 0.5), (1600, 0.25)])
