@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
-from uas_coverage_env.env.actions import ACTIONS, ActionKind
+from uas_coverage_env.env.actions import ACTIONS, ACTIONS_V1, ActionKind
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
 from uas_coverage_env.env.observation.named import OBSERVATIONS
 from uas_coverage_env.env.report import INFOS, InfoField
@@ -88,7 +88,7 @@ class Version:
 V0 = Version("v0", OBSERVATION, REWARD, ACTIONS, observations=OBSERVATIONS)
 """The first version."""
 
-V1 = Version("v1", OBSERVATION, REWARD, ACTIONS, observations=OBSERVATIONS, flat_infos=True)
+V1 = Version("v1", OBSERVATION, REWARD, ACTIONS_V1, observations=OBSERVATIONS, flat_infos=True)
 """As hard as the first, and learnable: see docs/versions.md."""
 
 
