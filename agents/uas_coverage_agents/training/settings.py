@@ -2,7 +2,7 @@
 
 import inspect
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -170,17 +170,18 @@ def _set(data: dict[str, Any], change: str) -> None:
     data[last] = value
 
 
-def own_settings(settings: LearnerSettings, model: type[M]) -> M:
+def own_settings(settings: LearnerSettings, model: type[M], reads: Collection[str] = ()) -> M:
     """The table `[learning]` of a learner that has settings of its own.
 
     Args:
         settings: Of the training.
         model: What the table may hold.
+        reads: Further keys that the learner reads.
 
     Raises:
         InputError: There is something else in it, or a key that this learner does not read.
     """
-    for name in settings.model_fields_set - _OF_ALL:
+    for name in settings.model_fields_set - _OF_ALL - set(reads):
         raise InputError(f"{name} = {getattr(settings, name)!r}: {settings.algorithm} reads none")
     return parse(settings.learning, model, "[learning]")
 
