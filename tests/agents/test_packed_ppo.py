@@ -152,7 +152,8 @@ def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
     assert len(rows.read) == len(rows.actions) == len(rows.returns) == flew.sum()
     assert 0 < flew.sum() < flew.size
     told = flown.tell()
-    assert told["flights"] > 0 and told["home"] == 1.0
+    assert told["flights"] > 0
+    assert told["home"] == 1.0
     assert flown.tell()["flights"] == 0
 
 
@@ -229,7 +230,7 @@ def test_a_file_whose_network_reads_what_is_not_there_is_refused():
         {"vectors": ((0, 1, -1),)},
         {"candidates": {**data["candidates"], "sharp": data["candidates"]["sharp"][1:]}},
     ):
-        with pytest.raises(ValueError, match="column|greater|row"):
+        with pytest.raises(ValueError, match=r"column|greater|row"):
             Actor.model_validate({**data, **change})
 
 
