@@ -22,7 +22,8 @@ import numpy as np
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.statistics import iqm
 from uas_coverage_env.runner.store import rows_in
-from uas_coverage_env.tasks import LEVELS, SPLITS
+from uas_coverage_env.tasks import SPLITS, level_named
+from uas_coverage_env.tasks.levels import level_names
 from uas_coverage_env.tasks.scoring import RANDOM, Anchors, MissionScore, scored
 from uas_coverage_env.tasks.table import markdown
 
@@ -74,10 +75,10 @@ def anchors_from(planners: Mapping[str, Sequence[MissionScore]]) -> dict[str, An
 def tables(flown: Flown) -> str:
     """The tables of all levels that were flown."""
     parts = []
-    for level, task in LEVELS.items():
+    for level in level_names():
         if level in flown:
             scores = {planner: scored(level, each) for planner, each in flown[level].items()}
-            parts.append(f"\n`{task.id}`\n\n{markdown(scores)}\n")
+            parts.append(f"\n`{level_named(level).id}`\n\n{markdown(scores)}\n")
     return "".join(parts) + "\n"
 
 

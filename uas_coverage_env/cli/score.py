@@ -12,14 +12,14 @@ from uas_coverage_env.cli.output import console
 from uas_coverage_env.cli.sweeps import end_with, fly_and_keep, refuse_former
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.files.suggestions import check_choice
-from uas_coverage_env.leaderboard import PlannerSpec, Row
+from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.runner.store import opened
 from uas_coverage_env.runner.workers import Workers
-from uas_coverage_env.tasks.levels import LEVELS
+from uas_coverage_env.tasks.levels import level_named, level_names
 from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
 from uas_coverage_env.tasks.table import markdown
-from uas_coverage_env.tasks.task import SPLITS
+from uas_coverage_env.tasks.task import SPLITS, Task
 
 _PLANNERS = "random,nearest-waypoint,lawnmower,tour,trajectory"
 _SPLITS = tuple(split for split in SPLITS if split != "training")
@@ -27,7 +27,7 @@ _SPLITS = tuple(split for split in SPLITS if split != "training")
 
 def score_command(
     level: Annotated[
-        str, typer.Option(metavar="NAME,...", help=f"Of {', '.join(LEVELS)}.")
+        str, typer.Option(metavar="NAME,...", help=f"Of {', '.join(level_names())}.")
     ] = "easy",
     planners: Annotated[
         str,
@@ -51,14 +51,11 @@ def score_command(
     """
     levels, names = _named("--level", level), _named("--planners", planners)
     for name in levels:
-        check_choice("--level", name, tuple(LEVELS))
+        check_choice("--level", name, level_names())
     check_choice("--split", split, _SPLITS)
     if missions > len(SPLITS[split]):
         raise InputError(f"--missions {missions}: --split {split} has {len(SPLITS[split])}")
-    entries = {
-        name: _entries(name, [spec_of(planner, LEVELS[name]) for planner in names], split, missions)
-        for name in levels
-    }
+    entries = {name: _entries(level_named(name), names, split, missions) for name in levels}
     every, screen = [entry for some in entries.values() for entry in some], console()
     with (
         Workers(jobs, backend) as workers,
@@ -75,19 +72,19 @@ def score_command(
             if entry.key in found:
                 mission = MissionScore.of(found[entry.key])
                 flown.setdefault(entry.spec.label, []).append(mission)
-        screen.print(f"{LEVELS[name].id}, {split} missions", markup=False)
+        screen.print(f"{level_named(name).id}, {split} missions", markup=False)
         # a table in a file is not to be wrapped
         scores = {planner: scored(name, each) for planner, each in flown.items()}
         sys.stdout.write(f"\n{markdown(scores)}\n\n")
     end_with([found[entry.key] for entry in every if entry.key in found], trouble)
 
 
-def _entries(level: str, specs: Sequence[PlannerSpec], split: str, missions: int) -> list[Entry]:
+def _entries(task: Task, planners: Sequence[str], split: str, missions: int) -> list[Entry]:
     """The flights of a level, mission by mission: a score under way compares like with like."""
-    scenarios = LEVELS[level].scenarios(split, missions)
+    specs = [spec_of(planner, task) for planner in planners]
     return [
-        entry_of(spec, LEVELS[level], seed, scenario)
-        for seed, scenario in scenarios.items()
+        entry_of(spec, task, seed, scenario)
+        for seed, scenario in task.scenarios(split, missions).items()
         for spec in specs
     ]
 

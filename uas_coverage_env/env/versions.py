@@ -88,8 +88,17 @@ class Version:
 V0 = Version("v0", OBSERVATION, REWARD, ACTIONS, observations=OBSERVATIONS)
 """The first version."""
 
+V1 = Version("v1", OBSERVATION, REWARD, ACTIONS, observations=OBSERVATIONS, flat_infos=True)
+"""As hard as the first, and learnable: see docs/versions.md."""
+
 
 def version_named(name: str) -> Version:
-    """The version of the module `uas_coverage_NAME`."""
+    """The version of the module `uas_coverage_NAME`.
+
+    Raises:
+        ValueError: There is none.
+    """
+    if name not in version_names():
+        raise ValueError(f"version is {name!r}; it is one of {', '.join(version_names())}")
     version: Version = import_module(f"uas_coverage_env.uas_coverage_{name}").VERSION
     return version

@@ -212,8 +212,9 @@ def entry_of(spec: PlannerSpec, task: Task, seed: int, scenario: Scenario) -> En
         seed,
         safety_filter=task.safety_filter,
         return_mode=task.return_mode,
+        environment=task.version,
         reward_weights=task.reward_weights,
-        level=task.level,
+        level=task.name,
     )
 
 

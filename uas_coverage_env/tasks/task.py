@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.scenario import Family, MissionSource, Scenario
 from uas_coverage_env.scenario.levels import with_disturbances
 
@@ -34,7 +35,7 @@ class Task:
     """One level. What is on is part of it: none of it can be said otherwise.
 
     Attributes:
-        level: Its name, lower case.
+        level: Its name, lower case, without its version.
         meaning: What it is, in a sentence.
         families: Each mission is of one of them; all are equally likely.
         return_mode: Whether the world brings UAS home in time.
@@ -44,6 +45,7 @@ class Task:
         disturbances: Level of wind and wrong models; None: still air.
         faults: What goes wrong in a mission: (rng, scenario) -> the scenario with its events.
         reward_weights: Weights that are not the default ones.
+        version: Of its environments. Missions are the same in all of them.
     """
 
     level: str
@@ -56,11 +58,17 @@ class Task:
     disturbances: str | None = None
     faults: Callable[[Rng, Scenario], Scenario] | None = None
     reward_weights: Mapping[str, float] = field(default_factory=dict)
+    version: Version = V0
+
+    @property
+    def name(self) -> str:
+        """Its name: `hard`, or with the version `hard-v1`."""
+        return level_name(self.level, self.version.name)
 
     @property
     def id(self) -> str:
         """Under which Gymnasium knows it."""
-        return gymnasium_id(self.level)
+        return f"UASCoverage/{self.level.capitalize()}-{self.version.name}"
 
     def scenario(self, seed: int) -> Scenario:
         """The mission of a seed; the same each time."""
@@ -95,7 +103,7 @@ class Task:
         )
 
     def settings(self, **chosen: Any) -> dict[str, Any]:
-        """Keyword arguments of an environment.
+        """Keyword arguments of an environment; with `version`, unless it is the first.
 
         Args:
             **chosen: What a learner may choose (`LEARNERS_CHOICE`).
@@ -118,6 +126,8 @@ class Task:
         }
         if "reward" not in chosen:
             given["reward_weights"] = dict(self.reward_weights)
+        if self.version is not V0:
+            given["version"] = self.version
         return {**given, **chosen}
 
 
@@ -132,9 +142,9 @@ class _Draw:
         return self.task.scenario(int(rng.integers(self.seeds.start, self.seeds.stop)))
 
 
-def gymnasium_id(level: str) -> str:
-    """Under which Gymnasium knows a level."""
-    return f"UASCoverage/{level.capitalize()}-v0"
+def level_name(level: str, version: str) -> str:
+    """The name of a level in a version: that of the first goes without it."""
+    return level if version == V0.name else f"{level}-{version}"
 
 
 def seeds_of(split: str) -> range:

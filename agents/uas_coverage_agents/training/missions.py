@@ -15,7 +15,7 @@ from uas_coverage_env.scenario import Family, MissionSource, Scenario
 from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.scenario.families.family import FamilyOfSeeds
 from uas_coverage_env.scenario.families.generated import GeneratedScenarios
-from uas_coverage_env.tasks import LEVELS
+from uas_coverage_env.tasks.levels import level_named, level_names
 from uas_coverage_env.tasks.scoring import entry_of
 from uas_coverage_env.tasks.task import SPLITS, Task
 
@@ -46,7 +46,8 @@ class Missions:
         Raises:
             InputError: There is no such level, family or scenario, or it has no such choice.
         """
-        name, origin = settings.scenario, LEVELS.get(settings.scenario)
+        name: str = settings.scenario
+        origin = level_named(name) if name in level_names() else None
         families = installed_families()
         if origin is None and name in families:
             made = cls(name, _sized(families[name], settings.size), settings.environment)

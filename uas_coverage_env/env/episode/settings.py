@@ -142,19 +142,26 @@ class MissionSettings:
 
     @classmethod
     def of(
-        cls, given: Mapping[str, Any], version: Version = V0, beside: Sequence[str] = ()
+        cls, given: Mapping[str, Any], version: Version | None = None, beside: Sequence[str] = ()
     ) -> "MissionSettings":
         """The settings of keyword arguments.
 
         Args:
-            given: Name -> value, see `MissionKeywords`.
-            version: Of the environment.
+            given: Name -> value, see `MissionKeywords`; and `version`, of settings of a level.
+            version: Of the environment; None: as given, or the first.
             beside: Other keyword arguments of the function that takes them, for its error.
 
         Raises:
             ValueError: There is no such setting, or a value is none of what is allowed.
         """
         known = tuple(MissionKeywords.__annotations__)
+        given = dict(given)
+        told = given.pop("version", version or V0)
+        if version is not None and told is not version:
+            raise ValueError(
+                f"version is {told.name}, and the environment's is {version.name}; take that of "
+                f"uas_coverage_{told.name}"
+            )
         for name in given:
             if name not in known:
                 taken = ", ".join((*beside, *known))
@@ -162,7 +169,7 @@ class MissionSettings:
                     f"unexpected keyword argument {name!r}; there are {taken}"
                 )
         inside = {inside_name(name): value for name, value in given.items()}
-        return cls(**inside, version=version)
+        return cls(**inside, version=told)
 
     @property
     def weights(self) -> NDArray[np.float64]:

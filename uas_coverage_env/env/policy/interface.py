@@ -200,5 +200,5 @@ def _command(row: np.void) -> Command:
     if kind == WRENCH:
         return Wrench(*values, mode=mode)
     if kind == GO_TO:
-        return GoTo(None if values[0] == HOME else int(values[0]), mode)
+        return GoTo(None if values[0] == HOME else int(values[0]), mode, values[1])
     raise ValueError("the kind of action writes CLIMB, which no planner can command")
