@@ -4,22 +4,29 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from pydantic import JsonValue
 
 from uas_coverage_agents.policy.actor import Actor
 from uas_coverage_agents.policy.description import Observation
 from uas_coverage_agents.policy.directory import Policy
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.observation.scales import SCALES
+from uas_coverage_env.env.versions import version_named
 from uas_coverage_env.flight import Assistants, as_planner
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.world import Command, SwarmState
 
-LAYOUT = "uas_coverage_v0"
-
 
 def observed(keywords: Mapping[str, Any]) -> Observation:
     """What a policy of these environments reads of one UAS."""
-    return Observation.of(LAYOUT, MissionSettings.of(keywords).observation, SCALES)
+    settings = MissionSettings.of(keywords)
+    return Observation.of(f"uas_coverage_{settings.version.name}", settings.observation, SCALES)
+
+
+def plain(keywords: Mapping[str, Any]) -> dict[str, JsonValue]:
+    """Keyword arguments of environments as they are written into a file."""
+    version = {"version": keywords["version"].name} if "version" in keywords else {}
+    return {**keywords, **version}
 
 
 def keywords_of(policy: Policy) -> dict[str, Any]:
@@ -32,6 +39,8 @@ def keywords_of(policy: Policy) -> dict[str, Any]:
     if not isinstance(network, Actor):
         raise ValueError(f"network.kind is {network.kind!r}, not 'actor'")
     keywords: dict[str, Any] = dict(network.environment)
+    if "version" in keywords:
+        keywords["version"] = version_named(str(keywords["version"]))
     if network.candidates is not None:
         keywords["mask_in_observation"] = True
     settings = MissionSettings.of(keywords)

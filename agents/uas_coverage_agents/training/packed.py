@@ -22,7 +22,7 @@ from pydantic import Field, model_validator
 from torch import Tensor, nn
 
 from uas_coverage_agents.policy.actor import Actor
-from uas_coverage_agents.policy.environment import observed
+from uas_coverage_agents.policy.environment import observed, plain
 from uas_coverage_agents.training.actor import ActorCritic
 from uas_coverage_agents.training.learner import SEEDS_APART, Arrays, Learned, Told
 from uas_coverage_agents.training.missions import Missions
@@ -141,7 +141,7 @@ class PackedPpo:
             hidden=self._own.hidden,
             width=self._own.width,
             rows=self._own.rows,
-            environment=self._keywords,
+            environment=plain(self._keywords),
         )
         self._model = ActorCritic(self._network)
         self._optimiser = torch.optim.Adam(self._model.parameters(), eps=1e-5)
@@ -307,7 +307,7 @@ class _Flown:
         ended, values = decided.copy(), np.zeros((steps + 1, *shape[1:]), np.float32)
         kept: list[tuple[Any, ...]] = []
         for t in range(steps):
-            acts = decided[t] = batch.flying
+            acts = decided[t] = batch.deciding
             read, each = model.read(batch.observation[acts])
             masks = torch.from_numpy(batch.action_masks()[acts]) if batch.chooses else None
             with torch.no_grad():
@@ -317,7 +317,7 @@ class _Flown:
             batch.step(_asked(batch, acts, actions))
             rewards[t] = self._own.reward_scale * batch.lanes.rewards
             ended[t] = self._end(acts)
-        last = batch.flying
+        last = batch.deciding
         with torch.no_grad():
             values[steps][last] = model.values(model.read(batch.observation[last])[0]).numpy()
         own = self._own

@@ -53,9 +53,11 @@ class Environment(StrictModel):
     """What a learner chooses of its environments, by their own names.
 
     What is None is as the level says; elsewhere it is the environment's default, but for the
-    assistants, which are on.
+    assistants, which are on. `version` is that of the environments, v0 or v1: missions are the same
+    in both.
     """
 
+    version: Annotated[str, Field(pattern="^v[0-9]+$")] | None = None
     action: str | None = None
     observation: str = "default"
     reward_weights: dict[str, float] | None = None
