@@ -41,13 +41,13 @@ def keywords_of(policy: Policy) -> dict[str, Any]:
     keywords: dict[str, Any] = dict(network.environment)
     if "version" in keywords:
         keywords["version"] = version_named(str(keywords["version"]))
-    if network.candidates is not None:
-        keywords["mask_in_observation"] = True
     settings = MissionSettings.of(keywords)
+    if settings.chooses:
+        keywords["mask_in_observation"] = True
     if not policy.description.observation.has_the_numbers_of(observed(keywords)):
         raise ValueError("its observation is not that of this version; train it anew")
     wanted = settings.kind.choices or settings.kind.size
-    if (network.candidates is not None) != settings.chooses or network.outputs != wanted:
+    if network.outputs != wanted or (network.candidates and not settings.chooses):
         raise ValueError(f"network: {network.outputs} outputs for action {settings.kind.name!r}")
     return keywords
 
@@ -57,6 +57,9 @@ def action_of(policy: Policy) -> Callable[[Any], Any]:
 
     With choices it takes a mapping of `observation` and `action_mask`, as `mask_in_observation`
     makes it; what is masked is never chosen.
+
+    Raises:
+        ValueError: See `keywords_of`.
     """
 
     def actions(seen: Any) -> Any:
@@ -66,8 +69,7 @@ def action_of(policy: Policy) -> Callable[[Any], Any]:
         scores = policy.forward(seen["observation"])
         return np.where(seen["action_mask"], scores, -np.inf).argmax(axis=-1)
 
-    chooses = getattr(policy.description.network, "candidates", None) is not None
-    return choices if chooses else actions
+    return choices if keywords_of(policy).get("mask_in_observation") else actions
 
 
 class ActorRunner:

@@ -79,7 +79,7 @@ class PackedSettings(StrictModel):
         target_kl: No further epoch where the policy has moved so far.
         reward_scale: What is learned is this times the reward.
         hidden: Widths of the layers, of policy and of values.
-        width: Of the scorer of candidates.
+        width: Of the scorer of candidates; 0: there is none, choices are outputs like others.
         rows: How many of the nearest waypoints the layers see.
         missions: Of a round, from which the environments draw.
         phases: In order of their begin; the first begins at 0.
@@ -96,7 +96,7 @@ class PackedSettings(StrictModel):
     target_kl: Positive = 0.04
     reward_scale: Positive = 0.2
     hidden: Annotated[tuple[Count, ...], Field(min_length=1, max_length=8)] = (96, 64)
-    width: Count = 32
+    width: Annotated[int, Field(ge=0, le=4096)] = 32
     rows: Count = 6
     missions: Count = 128
     phases: Annotated[tuple[Phase, ...], Field(min_length=1)] = (Phase(),)
@@ -136,7 +136,7 @@ class PackedPpo:
         self._chooses = rules.chooses
         self._network = Actor.of(
             rules.observation,
-            K_WAYPOINTS if rules.chooses else 0,
+            K_WAYPOINTS if rules.chooses and self._own.width else 0,
             rules.kind.choices or rules.kind.size,
             hidden=self._own.hidden,
             width=self._own.width,
