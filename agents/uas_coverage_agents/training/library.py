@@ -11,7 +11,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.logger import KVWriter, Logger
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.policy.description import Observation
+from uas_coverage_agents.policy.environment import observed
 from uas_coverage_agents.policy.library import Library
 from uas_coverage_agents.training.central_critic import CentralCriticPolicy
 from uas_coverage_agents.training.learner import Arrays, Learned, Told
@@ -22,12 +22,9 @@ from uas_coverage_agents.training.settings import LearnerSettings, named_objects
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
 from uas_coverage_env.env import CoverageSwarmEnv, full_state
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.env.observation.scales import SCALES
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.plugins.users_code import described
 from uas_coverage_env.scenario import MissionSource
-
-LAYOUT = "uas_coverage_v0"
 
 
 class LibraryLearner:
@@ -113,11 +110,6 @@ def env_of(
     if settings.agent == "each":
         return CoverageVecEnv(num_envs, source, **keywords)
     return make_vec_env(lambda: CoverageSwarmEnv(source, **keywords), num_envs)
-
-
-def observed(keywords: Mapping[str, Any]) -> Observation:
-    """What a policy of these environments reads of one UAS."""
-    return Observation.of(LAYOUT, MissionSettings.of(keywords).observation, SCALES)
 
 
 def model_of(
