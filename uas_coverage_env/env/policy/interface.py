@@ -179,7 +179,9 @@ class MissionInterface:
             their sum.
         """
         if self._world is not None and self._world.revisions != self._revisions:
+            before = self._learners.potentials
             self._lay_out()
+            self._learners.potentials[:] = before
         self._scratch.commands[:] = commands
         self._scratch.outcome[:] = outcome
         self._pay(
