@@ -22,11 +22,14 @@ from practice_grounds import practice_ground
 from uas_coverage_env import UasStatus, uas_coverage_v0
 from uas_coverage_env.env import ActionKind, CoverageBatch
 from uas_coverage_env.env.actions import ACTIONS, ACTIONS_V1
+from uas_coverage_env.env.actions.planar import PLANAR
+from uas_coverage_env.env.actions.velocity import VELOCITY_V1
 from uas_coverage_env.env.actions.waypoint import WAYPOINT_V1
 from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.layout import VX, VY, VZ
 
-OWN = [CLIMB_RATE, heading_and_speed(5.0), MANOEUVRES, WAYPOINT_V1]
+# those of another version are own kinds to v0
+OWN = [CLIMB_RATE, heading_and_speed(5.0), MANOEUVRES, VELOCITY_V1, PLANAR, WAYPOINT_V1]
 NAMES = [kind.name for kind in OWN]
 LIMITS = load_vehicle("s500_v2").limits
 

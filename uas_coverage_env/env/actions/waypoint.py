@@ -1,6 +1,6 @@
 """Which of the nearest open waypoints next, or home; in v1 also to hold, and to climb."""
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,15 +49,10 @@ def write(arena, state, tables, learners, i, parameters, values, command):
         command.values[2] = climb_m - state.x[i, Z]
 
 
-def _mask_of(choices: int) -> Callable[[NDArray[np.int64]], NDArray[np.bool_]]:
-    """Of the choices from home on, each exists always."""
-
-    def mask(candidates: NDArray[np.int64]) -> NDArray[np.bool_]:
-        masks = np.ones((*candidates.shape[:-1], choices), dtype=np.bool_)
-        np.greater_equal(candidates, 0, out=masks[..., :HOME_CHOICE])
-        return masks
-
-    return mask
+def _mask(choices: int, candidates: NDArray[np.int64]) -> NDArray[np.bool_]:
+    masks = np.ones((*candidates.shape[:-1], choices), dtype=np.bool_)
+    np.greater_equal(candidates, 0, out=masks[..., :HOME_CHOICE])
+    return masks
 
 
 def _express(arena, state, tables, learners, i, parameters, command):
@@ -108,7 +103,7 @@ WAYPOINT = ActionKind(
     ),
     write=write,
     choices=HOME_CHOICE + 1,
-    mask=_mask_of(HOME_CHOICE + 1),
+    mask=partial(_mask, HOME_CHOICE + 1),
     goes_to=True,
     express=_express,
 )
@@ -124,7 +119,7 @@ WAYPOINT_V1 = ActionKind(
     ),
     write=write,
     choices=CLIMB_CHOICE + 1,
-    mask=_mask_of(CLIMB_CHOICE + 1),
+    mask=partial(_mask, CLIMB_CHOICE + 1),
     goes_to=True,
     express=_express_more,
 )
