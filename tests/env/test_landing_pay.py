@@ -5,7 +5,7 @@ import pytest
 from practice_grounds import practice_ground
 
 from uas_coverage_env import GoTo, rollout
-from uas_coverage_env.env.rewards import REWARD_V1
+from uas_coverage_env.env.rewards.version_1 import REWARD_V1
 
 NAMES = [term.name for term in REWARD_V1]
 WEIGHT = {term.name: term.weight for term in REWARD_V1}

@@ -8,7 +8,8 @@ from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.entities.state import FLYING, LANDED, LOST
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.report import FIRST_TERM, STATUS
-from uas_coverage_env.env.rewards import REWARD_V1, to_home, to_waypoint
+from uas_coverage_env.env.rewards import to_home, to_waypoint
+from uas_coverage_env.env.rewards.version_1 import REWARD_V1
 
 LANES = 12
 FIELD = practice_ground(max_steps=80)
