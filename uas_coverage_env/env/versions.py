@@ -10,7 +10,8 @@ from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
 from uas_coverage_env.env.observation.layout import OBSERVATION_V1
 from uas_coverage_env.env.observation.named import OBSERVATIONS, OBSERVATIONS_V1
 from uas_coverage_env.env.report import INFOS, InfoField
-from uas_coverage_env.env.rewards import REWARD, REWARD_V1, RewardTerm
+from uas_coverage_env.env.rewards import REWARD, RewardTerm
+from uas_coverage_env.env.rewards.version_1 import REWARD_V1
 from uas_coverage_env.registration import version_names
 
 
@@ -95,12 +96,14 @@ V1 = Version(
 """As hard as the first, and learnable: see docs/versions.md."""
 
 
-def version_named(name: str) -> Version:
-    """The version of the module `uas_coverage_NAME`.
+def version_named(name: str | Version) -> Version:
+    """The version of the module `uas_coverage_NAME`; a version itself stays.
 
     Raises:
         ValueError: There is none.
     """
+    if isinstance(name, Version):
+        return name
     if name not in version_names():
         raise ValueError(f"version is {name!r}; it is one of {', '.join(version_names())}")
     version: Version = import_module(f"uas_coverage_env.uas_coverage_{name}").VERSION

@@ -1,4 +1,4 @@
-"""How far it is past the fixed obstacles, and what the flight takes: for observations and rewards."""
+"""How far it is past obstacles, and what the flight takes: for observations and rewards."""
 
 import math
 
@@ -46,7 +46,7 @@ def seconds_of(arena, i, way_m, up_m, down_m):
 
 @kernel
 def seconds_there(arena, i, target, x, y, z):
-    """Way [m] of UAS i from a place to a target, and time at top speed with climb or descent [s]."""
+    """Way [m] of UAS i from a place to a target, and time at top speed, up and down, too [s]."""
     _, _, way_m, below_m = way_to(arena, i, target, x, y, z)
     return way_m, seconds_of(arena, i, way_m, max(0.0, -below_m), max(0.0, below_m))
 
