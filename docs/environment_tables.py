@@ -27,6 +27,7 @@ from uas_coverage_env.env.batch.memory import FINAL, LANES
 from uas_coverage_env.env.episode.memory import LEARNERS
 from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, inside_name
 from uas_coverage_env.env.observation import OBSERVATION, grid
+from uas_coverage_env.env.observation.block import Group
 from uas_coverage_env.env.rendering.screen import RENDER_MODES
 
 SCENARIO = "village"
@@ -58,10 +59,10 @@ def environment_summary() -> str:
     return table((env.metadata["name"], ""), rows)
 
 
-def observation_groups() -> str:
-    """The groups of the default observation, and where each lies."""
+def observation_groups(blocks: Sequence[Group] = OBSERVATION) -> str:
+    """The groups of an observation, and where each lies."""
     rows, start = [], 0
-    for group in OBSERVATION:
+    for group in blocks:
         n, features = group.width * group.repeats, ", ".join(f.name for f in group.features)
         many = f", {group.repeats} × {group.width} numbers" if group.repeats > 1 else ""
         rows.append((f"{start}-{start + n - 1}", f"`{group.name}`{many}", features))
@@ -205,6 +206,11 @@ def without_meanings(rows: str) -> str:
     """Of a table of features, the columns of indices and names."""
     cut = [line.split("|")[1:3] for line in rows.splitlines()]
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
+
+
+def without_index(rows: str) -> str:
+    """A table of features without the column of indices."""
+    return "\n".join(f"|{line.split('|', 2)[2]}" for line in rows.splitlines())
 
 
 _SETTING = re.compile(r"^( +)action: (?:.*\n)+?\1 +.*as in the version\.\n", re.MULTILINE)

@@ -29,6 +29,7 @@ from environment_tables import (
     observation_groups,
     picture_channels,
     with_settings_written_out,
+    without_index,
     without_meanings,
 )
 from families_picture import families_table
@@ -46,7 +47,9 @@ from uas_coverage_env.env.api.aec import in_turns
 from uas_coverage_env.env.gpu.refused import REFUSED
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, full_state, local
 from uas_coverage_env.env.observation.layout import layout_table
+from uas_coverage_env.env.observation.ways import WAYS
 from uas_coverage_env.env.rewards.terms import rewards_table
+from uas_coverage_env.env.versions import V1
 from uas_coverage_env.flight import Why, figures
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.leaderboard.scores import columns
@@ -248,6 +251,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
     "observation_groups": observation_groups,
+    "observation_groups_v1": partial(observation_groups, V1.observation),
+    "observation_ways": lambda: without_index(layout_table((WAYS,))),
     "observations": lambda: f"{OBSERVATION_SIZE} numbers.\n\n{layout_table()}",
     "observation_local": lambda: without_meanings(layout_table(local())),
     "observation_grid": picture_channels,
@@ -255,6 +260,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "actions": partial(action_tables, ACTIONS),
     "actions_v1": partial(action_tables, [kind for kind in ACTIONS_V1 if kind not in ACTIONS]),
     "rewards": rewards_table,
+    "rewards_v1": partial(rewards_table, V1.reward),
     "infos": docstring_section("Infos"),
     "starting_state": docstring_section("Starting State"),
     "episode_end": docstring_section("Episode End"),

@@ -1,6 +1,7 @@
 """UAS coverage, version 1: the missions and physics of version 0, and an environment to learn in.
 
-Version history: v1, ways past obstacles are observed, and what is left open has a price.
+Version history: v1, ways past obstacles are observed, and what is left open has a price
+(docs/versions.md).
 """
 
 from collections.abc import Sequence

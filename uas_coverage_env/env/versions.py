@@ -10,7 +10,8 @@ from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
 from uas_coverage_env.env.observation.layout import OBSERVATION_V1
 from uas_coverage_env.env.observation.named import OBSERVATIONS, OBSERVATIONS_V1
 from uas_coverage_env.env.report import INFOS, InfoField
-from uas_coverage_env.env.rewards import REWARD, REWARD_V1, RewardTerm
+from uas_coverage_env.env.rewards import REWARD, RewardTerm
+from uas_coverage_env.env.rewards.version_1 import REWARD_V1
 from uas_coverage_env.registration import version_names
 
 

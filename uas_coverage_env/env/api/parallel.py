@@ -130,6 +130,9 @@ class CoverageParallelEnv(Versioned, ParallelEnv[str, NDArray[np.float32], Any])
 
     Version History:
         v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
+
+        v1: Ways past obstacles are observed, velocities are fine near rest, waypoints can be passed
+        over, and what is left open has a price (docs/versions.md).
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]
