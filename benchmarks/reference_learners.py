@@ -29,7 +29,7 @@ from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, 
 PAGE = Path(__file__).parents[1] / "docs" / "level_scores.md"
 FIRST, LAST = "<!-- reference learners: {} -->\n", "<!-- end of reference learners: {} -->"
 REFERENCE = sorted(
-    path.stem for path in FOLDER.glob("*.toml") if not path.stem.startswith("learned-")
+    path.stem for path in FOLDER.glob("*.toml") if not path.stem.startswith(("learned-", "ppo-"))
 )
 HEAD = (
     "learner", "steps", "processor time, s", "trainings", "score [95 %]", "covered, %",

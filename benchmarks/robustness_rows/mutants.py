@@ -1,15 +1,17 @@
 """R13: the safety files with one operator, constant or condition changed: does a test see it?
 
 The mutants are Cosmic Ray's (extra `mutants`), drawn for each file of `benchmarks/mutants.toml`;
-each meets the tests named there, in a copy of the source tree. Kernels are run as plain Python: a
-mutant of a kernel would have to compile all that calls it. Only operators that leave a program of
-the kind that someone could have written are used: no `is` between numbers, no `+` for a `<<`.
+each meets the tests named there, in a copy of the source tree. For a file with kernels all kernels
+are run as plain Python: a mutant of one would have to compile all that calls it. Only operators
+that leave a program of the kind that someone could have written are used: no `is` between numbers,
+no `+` for a `<<`.
 """
 
 from __future__ import annotations
 
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -27,6 +29,7 @@ TABLE = tomllib.loads((ROOT / "benchmarks/mutants.toml").read_text("utf-8"))
 LEAST_SHARE = 0.8
 _TREE = ("uas_coverage_env", "baselines", "agents", "benchmarks", "tests", "pyproject.toml")
 _LONGEST_S = 600.0  # a mutant that takes longer is caught
+_MACHINE_CODE = ".nbc"
 _SWAPPED = ("Add_Sub", "Mul_Div")
 _COMPARED = ("Lt_LtE", "Gt_GtE", "Lt_GtE", "Gt_LtE", "Eq_NotEq", "Is_IsNot")
 _OTHERS = (
@@ -60,10 +63,17 @@ def _tree() -> tempfile.TemporaryDirectory[str]:
     for name in _TREE:
         start, end = ROOT / name, Path(place.name, name)
         if start.is_dir():
-            shutil.copytree(start, end, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(
+                start, end, ignore=shutil.ignore_patterns("*.pyc"), copy_function=_copied
+            )
         else:
             shutil.copy2(start, end)
     return place
+
+
+def _copied(start: str, end: str) -> None:
+    """A file as another; of machine code, which is kept by what it was made from, a link."""
+    (os.symlink if start.endswith(_MACHINE_CODE) else shutil.copy2)(start, end)
 
 
 def _drawn(path: str, number: int) -> Any:
@@ -101,28 +111,29 @@ def tried(path: str, number: int) -> Result:
     from cosmic_ray.plugins import get_operator
 
     (tests,) = (each["tests"] for each in TABLE["files"] if each["path"] == path)
+    file = Path(_tree().name, path)
+    plain = re.search(r"^@\w*kernel\b", file.read_text("utf-8"), re.MULTILINE) is not None
     if number < 0:
-        if _fail(tests):
+        if _fail(tests, plain):
             raise RuntimeError(f"{path}: its tests fail without a mutant")
         return {"path": path, "mutant": None}
     mutant = _drawn(path, number)
     if mutant is None:
         return {"path": path, "mutant": None}
-    file = Path(_tree().name, path)
     with use_mutation(file, get_operator(mutant.operator_name)(), mutant.occurrence) as texts:
-        caught = _fail(tests)
+        caught = _fail(tests, plain)
     before, after = (str(text).split("\n") for text in texts)
     (k,) = (k for k, lines in enumerate(zip(before, after, strict=True)) if len({*lines}) > 1)
     change = f"{path}:{mutant.definition_name}: `{before[k].strip()}` -> `{after[k].strip()}`"
     return {"path": path, "mutant": change, "line": k + 1, "caught": caught}
 
 
-def _fail(tests: Sequence[str]) -> bool:
-    """Whether any of some tests fails in the copy."""
+def _fail(tests: Sequence[str], plain: bool) -> bool:
+    """Whether any of some tests fails in the copy, kernels as plain Python or compiled."""
     root = Path(_tree().name)
     path = os.pathsep.join(str(root / name) for name in ("", "baselines", "agents"))
     environment = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
-    environment["NUMBA_DISABLE_JIT"] = "1"
+    environment["NUMBA_DISABLE_JIT"] = str(int(plain))
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
     try:
         code = subprocess.run(

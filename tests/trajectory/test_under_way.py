@@ -1,10 +1,18 @@
 """A mission whose scene changes in flight: planned from where it is, flown as planned."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
+from hand_made import hover, straight
+from small_fleets import fleet_of
+from small_worlds import meadow
 from uas_coverage_baselines.tour import Tour, TourOptions
 from uas_coverage_baselines.tour.schedule import Schedule
 from uas_coverage_baselines.trajectory import Trajectory, TrajectoryOptions
-from uas_coverage_baselines.trajectory.under_way import still_clear
+from uas_coverage_baselines.trajectory.mission_plan import Planned
+from uas_coverage_baselines.trajectory.program import PlannedFlight
+from uas_coverage_baselines.trajectory.under_way import UnderWay, still_clear
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.flight.metrics import accomplished
@@ -66,6 +74,22 @@ def test_tour_goes_on_from_its_order_without_a_long_search(monkeypatch):
     flight = rollout(patrol(4), Tour(TourOptions(moves=20_000)))
     assert accomplished(flight)
     assert searches == [0.0, 0.0]  # the first to warm up
+
+
+def test_of_what_was_planned_holds_what_is_flown_as_planned():
+    nothing = np.zeros(0, np.int64), np.zeros((7, 10)), np.zeros((6, 3)), np.zeros((6, 10))
+    still = PlannedFlight(*nothing, 0.0, np.zeros(0))
+    courses = [straight((10.0 * k, 0.0, -10.0), (2.0, 0.0, 0.0), 6, begin=4) for k in range(3)]
+    planned = {k: Planned(np.zeros(0, np.int64), still, course) for k, course in enumerate(courses)}
+    backups = {1: hover((0.0, 0.0, -10.0))}
+    _, swarm = fleet_of(meadow(((20.0, 20.0, -1.0), (50.0, 20.0, -1.0), (80.0, 20.0, -1.0))))
+    x = np.array([course.x[3] for course in courses])
+    x[1, 0] += 0.01  # was pushed
+    now = UnderWay(None, planned, backups).at(replace(swarm, step=7, x=x))
+    assert now.planned.keys() == {0, 2}
+    assert now.planned[2] is planned[2]
+    assert now.backups is backups
+    assert not UnderWay(None, planned).at(replace(swarm, step=6, x=x)).planned
 
 
 def test_only_a_scene_with_at_most_more_waypoints_is_as_clear_as_it_was():

@@ -94,7 +94,7 @@ def _actions(
     asked = np.zeros(batch.learners.asked.shape)
     masks = batch.action_masks() if settings.mask_in_observation else None
     if swarm_of is None:
-        acts = batch.flying & flies[:, np.newaxis]
+        acts = batch.deciding
         told = shown(settings, seen[acts], None if masks is None else masks[acts])
         asked[acts] = np.asarray(policy(told)).reshape(-1, asked.shape[2])
     else:

@@ -39,6 +39,9 @@ RUNNERS = {
 """Interface of a policy -> entry point of its runner, `PolicyRunner(policy, assistants)`; loaded
 where it flies, since runners import this package."""
 
+_IN_NUMPY = {"actor": "uas_coverage_agents.policy.environment:ActorRunner"}
+"""The same for those kinds of network that need nothing else, whatever their interface."""
+
 
 def runner_of(policy: Policy, assistants: Assistants, *, trust: bool = False) -> PolicyRunner:
     """The runner that flies a policy.
@@ -52,9 +55,9 @@ def runner_of(policy: Policy, assistants: Assistants, *, trust: bool = False) ->
         InputError: What it needs is not installed.
         ValueError: The policy cannot be flown; says why.
     """
-    interface = policy.description.interface
+    interface, kind = policy.description.interface, policy.description.network.kind
     try:
-        runner = EntryPoint(interface, RUNNERS[interface], "").load()
+        runner = EntryPoint(interface, _IN_NUMPY.get(kind) or RUNNERS[interface], "").load()
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("uas_coverage"):
             raise  # ours is always there
@@ -62,7 +65,7 @@ def runner_of(policy: Policy, assistants: Assistants, *, trust: bool = False) ->
             f"it flies by the library that trained it, and {error.name} is not installed: "
             f"python -m pip install 'uas-coverage-env[learn]'"
         ) from error
-    more = {"trust": trust} if interface == "environment" else {}
+    more = {"trust": trust} if kind == "library" else {}
     return runner(policy, assistants, **more)
 
 

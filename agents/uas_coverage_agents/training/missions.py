@@ -7,6 +7,7 @@ from typing import Any
 from uas_coverage_agents.policy.description import ScenarioFamily, Towns
 from uas_coverage_agents.training.settings import Environment, LearnerSettings
 from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.versions import version_named
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import PlannerSpec
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
@@ -75,9 +76,10 @@ class Missions:
             **more: Instead of those that the learner has chosen.
         """
         chosen = {k: v for k, v in self.environment.model_dump().items() if v is not None} | more
+        version = {"version": version_named(chosen.pop("version"))} if "version" in chosen else {}
         if isinstance(self.origin, Task):
-            return self.origin.settings(**chosen)
-        return {"return_mode": True, "safety_filter": True, **chosen}
+            return replace(self.origin, **version).settings(**chosen)
+        return {"return_mode": True, "safety_filter": True, **version, **chosen}
 
     def mission(self, number: int) -> Scenario:
         """A mission to learn from, for learners that draw none themselves."""

@@ -173,6 +173,12 @@ class CoverageBatch:
         """(L, U) which UAS fly now, an array of its own."""
         return self.worlds.uas["status"] == FLYING
 
+    @property
+    def deciding(self) -> NDArray[np.bool_]:
+        """(L, U) which UAS decide in the coming step: they fly, in a mission that goes on."""
+        ended = self.lanes.terminated | self.lanes.truncated
+        return self.flying & ((self.autoreset == SAME_STEP) | ~ended)[:, None]
+
     def action_masks(self) -> NDArray[np.bool_]:
         """(L, U, choices) the choices that exist now."""
         return self.actions.kind.masks(self.learners.candidates)
