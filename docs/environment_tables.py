@@ -15,7 +15,12 @@ from uas_coverage_env.env import (
     CoverageParallelEnv,
     CoverageSwarmEnv,
 )
-from uas_coverage_env.env.actions import ACTIONS, HOME_CHOICE
+from uas_coverage_env.env.actions import (
+    CLIMB_CHOICE,
+    HOLD_CHOICE,
+    HOME_CHOICE,
+    ActionKind,
+)
 from uas_coverage_env.env.actions.given import actions_of
 from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 from uas_coverage_env.env.batch.memory import FINAL, LANES
@@ -71,16 +76,16 @@ def picture_channels() -> str:
     return table(("channel", "name", "meaning"), rows)
 
 
-def action_tables() -> str:
+def action_tables(kinds: Sequence[ActionKind]) -> str:
     """What each number of each kind of action means, for the shipped vehicle in the village."""
     scenario = load_scenario(SCENARIO)
     rows = []
-    for kind in ACTIONS:
+    for kind in kinds:
         actions = actions_of(kind, scenario)
         one, all_ = _shown(actions.space()), _shown(actions.joint_space(len(scenario.uas)))
         rows.append((f"`{kind.name}`", f"`{one}`", f"`{all_}`"))
     parts = [table(("`action`", "one UAS", "the swarm as one agent (two UAS)"), rows)]
-    for kind in ACTIONS:
+    for kind in kinds:
         if kind.choices:
             continue
         ranges = actions_of(kind, scenario).ranges[0]
@@ -92,7 +97,11 @@ def action_tables() -> str:
     choices = [
         (f"0 … {HOME_CHOICE - 1}", "that one of the nearest open waypoints, nearest first"),
         (str(HOME_CHOICE), "home"),
+        (str(HOLD_CHOICE), "nowhere: it holds where it is"),
+        (str(CLIMB_CHOICE), "where it is flying already, and climbs"),
     ]
+    n_choices = max(kind.choices for kind in kinds)
+    choices = choices[: n_choices - HOME_CHOICE + 1]
     parts += ["**waypoint**", table(("choice", "flies to"), choices)]
     return "\n\n".join(parts)
 

@@ -42,6 +42,7 @@ from uas_coverage_env.env import (
     CoverageSwarmEnv,
     CoverageVectorEnv,
 )
+from uas_coverage_env.env.actions import ACTIONS, ACTIONS_V1
 from uas_coverage_env.env.api.aec import in_turns
 from uas_coverage_env.env.gpu.refused import REFUSED
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, full_state, local
@@ -256,7 +257,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "observation_local": lambda: without_meanings(layout_table(local())),
     "observation_grid": picture_channels,
     "observation_full_state": lambda: layout_table(full_state(2, 3, 1)),
-    "actions": action_tables,
+    "actions": partial(action_tables, ACTIONS),
+    "actions_v1": partial(action_tables, [kind for kind in ACTIONS_V1 if kind not in ACTIONS]),
     "rewards": rewards_table,
     "rewards_v1": partial(rewards_table, V1.reward),
     "infos": docstring_section("Infos"),

@@ -20,7 +20,7 @@ ALTITUDE_MARGIN_M = 1.0
 SLOPE_AT_REST = 0.1
 """Of v1: a share s of the limit is s · (this + (1 - this) · s²). Noise of an action near 0 is ten
 times smaller in velocity than on a straight line, and a step there still changes something; the
-ends of the range are where they were. `benchmarks/landing_noise.py` shows who lands with it."""
+ends of the range are where they were. `benchmarks/learner_actions.py` shows who lands with it."""
 
 _LOW_SHARE = 1.0 / 6.0
 """Of v1: how much of the altitudes lies between -1 and 0, for the same reason."""
