@@ -79,7 +79,7 @@ class LearnerSettings(StrictModel):
         scenario: A level, a family, or a scenario; `--scenario` says another one.
         size: Of the missions of a family: `n_uas`, `n_waypoints`, `n_obstacles`, least and most.
         num_envs: Missions flown at the same time.
-        total_timesteps: Learned from, of all agents together.
+        total_timesteps: Flown steps to learn from: decisions of all agents together.
         rounds: How many; each ends with a checkpoint and begins with new missions.
         environment: What it chooses of its environments.
         learning: Arguments of the class, by its own names; else the library's defaults. A text
