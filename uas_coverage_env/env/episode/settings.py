@@ -13,7 +13,7 @@ from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.observation import ObservationBlock
 from uas_coverage_env.env.rewards import RewardTerm
 from uas_coverage_env.env.rewards.term import weights_of
-from uas_coverage_env.env.versions import V0, Version
+from uas_coverage_env.env.versions import V0, Version, version_named
 from uas_coverage_env.features.feature import MissionFeature, checked_features
 from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
@@ -83,7 +83,7 @@ class MissionSettings:
             that `Box`.
         flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
             libraries that make an array of every info (TorchRL). None: as in the version.
-        version: Which version of the environments this is.
+        version: Which version of the environments this is, or its name (`v1`).
 
     Raises:
         ValueError: A value is none of what is allowed; says what is.
@@ -104,7 +104,8 @@ class MissionSettings:
     version: Version = V0
 
     def __post_init__(self) -> None:
-        version = self.version
+        version = version_named(self.version)
+        object.__setattr__(self, "version", version)
         version.kind_of(self.action)
         if self.dynamics not in get_args(DynamicsName):
             allowed = ", ".join(get_args(DynamicsName))
@@ -156,7 +157,7 @@ class MissionSettings:
         """
         known = tuple(MissionKeywords.__annotations__)
         given = dict(given)
-        told = given.pop("version", version or V0)
+        told = version_named(given.pop("version", version or V0))
         if version is not None and told is not version:
             raise ValueError(
                 f"version is {told.name}, and the environment's is {version.name}; take that of "
