@@ -56,6 +56,7 @@ from uas_coverage_env.leaderboard.scores import columns
 from uas_coverage_env.planning.reserves import RESERVES, Reserve
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
+from uas_coverage_env.tasks import LESSONS
 
 DOCS = Path(__file__).resolve().parent
 SCHEMA = DOCS / "scenario.schema.json"
@@ -276,6 +277,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "learner_settings": learner_settings,
     "not_on_a_gpu": lambda: table(
         ("does not run on a GPU", "instead"), [(row.what, row.instead) for row in REFUSED]
+    ),
+    "lessons": lambda: table(
+        ("lesson", "what is easier"), [(f"`{name}`", one.meaning) for name, one in LESSONS.items()]
     ),
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
     **{name: partial(of_operations, name) for name in OPERATIONS},

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from tiny_trainings import tiny
-from uas_coverage_agents.training.library import LibraryLearner
 from uas_coverage_agents.training.learner import Told
+from uas_coverage_agents.training.library import LibraryLearner
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.rounds import learner_of
 

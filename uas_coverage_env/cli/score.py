@@ -17,11 +17,19 @@ from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.runner.store import opened
 from uas_coverage_env.runner.workers import Workers
 from uas_coverage_env.tasks.levels import level_named, level_names
-from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
+from uas_coverage_env.tasks.scoring import (
+    DESCRIPTION,
+    MissionScore,
+    batched,
+    entry_of,
+    score,
+    scored,
+    spec_of,
+)
 from uas_coverage_env.tasks.table import markdown
 from uas_coverage_env.tasks.task import SPLITS, Task
 
-_PLANNERS = "random,nearest-waypoint,lawnmower,tour,trajectory"
+_PLANNERS = "random,hover,nearest-waypoint,lawnmower,tour,trajectory"
 _SPLITS = tuple(split for split in SPLITS if split != "training")
 
 
@@ -42,12 +50,19 @@ def score_command(
     ] = Path("scores"),
     backend: BackendOption = "process",
     jobs: JobsOption = None,
+    one_by_one: Annotated[
+        bool,
+        typer.Option("--one-by-one", help="Fly and keep the missions of policies one by one, too."),
+    ] = False,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Fly the missions of a level and print the scores (docs/levels.md).
 
     Ctrl-C or a kill loses no mission that was flown: the same command goes on. Planners fly with
     the assistants of the level. Exits 1 where a mission could not be flown; it is worth nothing.
+
+    The missions of `policy:DIR`, where a library has learned it and it remembers nothing, are flown
+    side by side, in seconds, and not kept.
     """
     levels, names = _named("--level", level), _named("--planners", planners)
     for name in levels:
@@ -55,7 +70,15 @@ def score_command(
     check_choice("--split", split, _SPLITS)
     if missions > len(SPLITS[split]):
         raise InputError(f"--missions {missions}: --split {split} has {len(SPLITS[split])}")
-    entries = {name: _entries(level_named(name), names, split, missions) for name in levels}
+    alone: dict[str, list[str]] = {}
+    together: dict[str, list[str]] = {}
+    for name in levels:
+        for planner in names:
+            offers = not one_by_one and ":" in planner and batched(planner, level_named(name))
+            (together if offers else alone).setdefault(name, []).append(planner)
+    entries = {
+        name: _entries(level_named(name), alone.get(name, []), split, missions) for name in levels
+    }
     every, screen = [entry for some in entries.values() for entry in some], console()
     with (
         Workers(jobs, backend) as workers,
@@ -65,13 +88,16 @@ def score_command(
         trouble = fly_and_keep(every, store, workers, screen)
         found = {row.key: row for row in store.rows()}
     for name, some in entries.items():
-        if not any(entry.key in found for entry in some):  # stopped before
-            continue
         flown: dict[str, list[MissionScore]] = {}
+        for planner in () if trouble else together.get(name, []):
+            whole = score(planner, name, missions=missions, split=split, batch=missions)
+            flown[planner] = list(whole.missions)
         for entry in some:
             if entry.key in found:
                 mission = MissionScore.of(found[entry.key])
                 flown.setdefault(entry.spec.label, []).append(mission)
+        if not flown:  # stopped before
+            continue
         screen.print(f"{level_named(name).id}, {split} missions", markup=False)
         # a table in a file is not to be wrapped
         scores = {planner: scored(name, each) for planner, each in flown.items()}

@@ -12,6 +12,7 @@ from uas_coverage_env.features.radio import RadioLost
 from uas_coverage_env.registration import version_names
 from uas_coverage_env.scenario import Family, Scenario
 from uas_coverage_env.scenario.families import BUILT_IN
+from uas_coverage_env.tasks.lessons import LESSONS
 from uas_coverage_env.tasks.task import Task, level_name
 
 _BOTH = ("s500_v2", "hexacopter")
@@ -102,12 +103,28 @@ def level_names() -> tuple[str, ...]:
 def level_named(name: str) -> Task:
     """The level of a name: `hard`, or `hard-v1` for that of another version.
 
+    With lessons behind a colon, `hard:landing` or `hard:landing+few`, it is the level with these
+    made easier, to learn on (`LESSONS`).
+
     Raises:
         ValueError: There is none.
     """
-    if name not in level_names():
-        raise ValueError(f"level is {name!r}; it is one of {', '.join(level_names())}")
+    level, colon, lessons = name.partition(":")
+    if level not in level_names():
+        raise ValueError(f"level is {level!r}; it is one of {', '.join(level_names())}")
+    if colon:
+        return _with_lessons(level_named(level), lessons)
     if name in LEVELS:
         return LEVELS[name]
     level, _, version = name.rpartition("-")
     return replace(LEVELS[level], version=version_named(version))
+
+
+def _with_lessons(task: Task, names: str) -> Task:
+    for name in names.split("+"):
+        if name not in LESSONS:
+            raise ValueError(f"lesson is {name!r}; it is one of {', '.join(LESSONS)}")
+        lesson = LESSONS[name]
+        easier = task.easier if lesson.of is None else (*task.easier, lesson.of)
+        task = replace(task, lesson=names, easier=easier, **lesson.task)
+    return task

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,8 @@ class Task:
         faults: What goes wrong in a mission: (rng, scenario) -> the scenario with its events.
         reward_weights: Weights that are not the default ones.
         version: Of its environments. Missions are the same in all of them.
+        lesson: Names of what is easier than on the level, to learn on; empty: nothing is.
+        easier: What makes its missions so: from a mission of the level to one of the lesson.
     """
 
     level: str
@@ -59,11 +61,14 @@ class Task:
     faults: Callable[[Rng, Scenario], Scenario] | None = None
     reward_weights: Mapping[str, float] = field(default_factory=dict)
     version: Version = V0
+    lesson: str = ""
+    easier: tuple[Callable[[Scenario], Scenario], ...] = ()
 
     @property
     def name(self) -> str:
-        """Its name: `hard`, or with the version `hard-v1`."""
-        return level_name(self.level, self.version.name)
+        """Its name: `hard`, or with version and lesson `hard-v1:landing`."""
+        name = level_name(self.level, self.version.name)
+        return f"{name}:{self.lesson}" if self.lesson else name
 
     @property
     def id(self) -> str:
@@ -82,9 +87,10 @@ class Task:
             n: How many; None: all.
 
         Raises:
-            ValueError: There is no such split, or it has fewer missions.
+            ValueError: There is no such split, or it has fewer missions; or that of the tests is
+                asked of a lesson.
         """
-        seeds = seeds_of(split)
+        seeds = self._seeds_of(split)
         if n is not None and not 1 <= n <= len(seeds):
             raise ValueError(f"missions is {n}; give 1 to {len(seeds)}")
         return {seed: self.scenario(seed) for seed in seeds[:n]}
@@ -93,14 +99,19 @@ class Task:
         """What environments draw their missions from.
 
         Raises:
-            ValueError: There is no such split.
+            ValueError: There is no such split, or that of the tests is asked of a lesson.
         """
         return MissionSource(
-            _Draw(self, seeds_of(split)),
+            _Draw(self, self._seeds_of(split)),
             n_uas=max(family.size.n_uas[1] for family in self.families),
             n_waypoints=max(family.size.n_waypoints[1] for family in self.families),
             n_moving=max(family.n_moving for family in self.families),
         )
+
+    def _seeds_of(self, split: str) -> range:
+        if self.lesson and split == "test":
+            raise ValueError(f"{self.name} is a lesson, to learn on; it has no test missions")
+        return seeds_of(split)
 
     def settings(self, **chosen: Any) -> dict[str, Any]:
         """Keyword arguments of an environment; with `version`, unless it is the first.
@@ -164,7 +175,9 @@ def _mission_of(level: "_ByIdentity", seed: int) -> Scenario:
     rng = np.random.default_rng(seed)
     family = task.families[int(rng.integers(len(task.families)))]
     scenario = with_disturbances(family(rng), task.disturbances, seed)
-    return scenario if task.faults is None else task.faults(rng, scenario)
+    if task.faults is not None:
+        scenario = task.faults(rng, scenario)
+    return reduce(lambda mission, easier: easier(mission), task.easier, scenario)
 
 
 @dataclass(frozen=True)

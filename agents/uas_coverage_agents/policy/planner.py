@@ -12,6 +12,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Assistants, AssistedOptions
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.refusal import refuse_what_asks
+from uas_coverage_env.tasks.in_batch import BatchedPolicy
 from uas_coverage_env.world import Command, SwarmState
 
 
@@ -110,6 +111,11 @@ class PolicyPlanner:
     def fingerprint(self) -> str:
         """What the flights depend on beside the options: the checksum of the weights."""
         return self.policy.description.weights_sha256
+
+    @property
+    def in_batch(self) -> BatchedPolicy | None:
+        """The same for many UAS or swarms at once; None: it flies one mission at a time."""
+        return getattr(self._runner, "in_batch", None)
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what needs compiling."""

@@ -32,7 +32,7 @@ class Missions:
 
     Attributes:
         name: As it was asked for.
-        origin: A level, a family, or the only scenario.
+        origin: A level or a lesson of one, a family, or the only scenario.
         environment: What the learner chooses of its environments.
     """
 
@@ -48,7 +48,7 @@ class Missions:
             InputError: There is no such level, family or scenario, or it has no such choice.
         """
         name: str = settings.scenario
-        origin = level_named(name) if name in level_names() else None
+        origin = _level(name) if name.partition(":")[0] in level_names() else None
         families = installed_families()
         if origin is None and name in families:
             made = cls(name, _sized(families[name], settings.size), settings.environment)
@@ -135,6 +135,13 @@ class Missions:
             names = ("n_uas", "n_waypoints", "n_obstacles")
             towns = Towns(first_seed=_TOWNS, **dict(zip(names, ranges, strict=True)))
         return ScenarioFamily(name=self.name, towns=towns)
+
+
+def _level(name: str) -> Task:
+    try:
+        return level_named(name)
+    except ValueError as error:
+        raise InputError(f"scenario {name!r}: {error}") from error
 
 
 def _sized(family: Family | FamilyOfSeeds, size: Mapping[Any, Any]) -> Family | FamilyOfSeeds:

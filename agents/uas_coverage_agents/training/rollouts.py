@@ -1,8 +1,8 @@
 """What Stable-Baselines3 and sb3-contrib learn from: decisions alone.
 
 Where a UAS has landed or is lost before its mission ends, `CoverageVecEnv` has rows without a
-decision; on `hard` more than half of them. A buffer of this file keeps them out of the gradients, and
-`FlownSteps` out of the count of steps:
+decision; on `hard` more than half of them. A buffer of this file keeps them out of the gradients,
+and `FlownSteps` out of the count of steps:
 
     PPO("MlpPolicy", env, rollout_buffer_class=FlownRolloutBuffer).learn(10**6, FlownSteps())
 """
@@ -31,11 +31,13 @@ class FlownSteps(BaseCallback):
     """
 
     def _on_training_start(self) -> None:
-        if not isinstance(self.training_env.unwrapped, CoverageVecEnv):
-            raise ValueError(f"{self.training_env.unwrapped!r} is no CoverageVecEnv")
+        env = self.training_env.unwrapped
+        if not isinstance(env, CoverageVecEnv):
+            raise ValueError(f"{env!r} is no CoverageVecEnv")
+        self._env = env
 
     def _on_step(self) -> bool:
-        flew = self.training_env.unwrapped.flew
+        flew = self._env.flew
         self.model.num_timesteps += int(flew.sum()) - len(flew)
         self.num_timesteps = self.model.num_timesteps
         buffer = self.locals.get("rollout_buffer")

@@ -78,10 +78,11 @@ class LearnerSettings(StrictModel):
         agent: "swarm": one agent flies the whole fleet. "each": one agent per UAS, all of which
             share the weights.
         critic: "own": the critic sees what the policy sees. "full": the whole mission.
-        scenario: A level, a family, or a scenario; `--scenario` says another one.
+        scenario: A level, with or without lessons (`hard`, `hard:landing`), a family, or a
+            scenario; `--scenario` says another one.
         size: Of the missions of a family: `n_uas`, `n_waypoints`, `n_obstacles`, least and most.
         num_envs: Missions flown at the same time.
-        total_timesteps: Learned from, of all agents together.
+        total_timesteps: Flown steps to learn from: decisions of all agents together.
         rounds: How many; each ends with a checkpoint and begins with new missions.
         environment: What it chooses of its environments.
         learning: Arguments of the class, by its own names; else the library's defaults. A text

@@ -36,12 +36,12 @@ class CoverageVecEnv(VecEnv):
         `terminal_observation` and, as `Monitor` would write it, `episode` (return, length, time).
 
         A UAS that has ended before its mission waits: its reward is 0, its observation stays, its
-        actions have no effect, `alive` is False before a step and `flew` after it. Such rows hold no
-        decision; `uas_coverage_agents.training.rollouts` keeps them from learners. A mission begins anew in the step in which it
-        ends; then `dones` is True for the waiting ones, too, so that nothing is carried over from
-        the mission before, but there is no `episode` to count. The same holds for UAS that the
-        scenario of a mission does not have, where scenarios of different fleets are mixed; their
-        observation is zero.
+        actions have no effect, and `alive` is False before a step, `flew` after it. A mission
+        begins anew in the step in which it ends; then `dones` is True for the waiting ones, too, so
+        that nothing is carried over from the mission before, but there is no `episode` to count.
+        The same holds for UAS that the scenario of a mission does not have, where scenarios of
+        different fleets are mixed; their observation is zero. `training.rollouts` keeps all of
+        these rows from learners, and from the count of steps.
 
     Seeds:
         `seed(s)` seeds the draw of scenarios of mission m with s + m, at the next reset; the
@@ -206,7 +206,7 @@ class CoverageVecEnv(VecEnv):
         return self._flat(self.batch.observation)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of some lanes: `scenario`, `alive`, `flew`, one that was set, or a common one.
+        """An attribute of some lanes: `scenario`, `alive`, `flew`, one that was set, or a common.
 
         Raises:
             AttributeError: There is no such attribute.
