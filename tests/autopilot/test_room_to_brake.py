@@ -304,7 +304,7 @@ def test_a_path_has_the_room_that_it_keeps_beside_claimed_ways(worlds, seed, n_c
     assert found_m == pytest.approx(expected_m, abs=1e-6)
 
 
-@pytest.mark.parametrize("dt_s", [0.5, 1.0])
+@pytest.mark.parametrize("dt_s", [0.5, 1.0, 2.0])
 def test_a_way_is_claimed_for_five_seconds_and_braked_then(dt_s):
     world = World(meadow([MIDDLE_M], dt_s=dt_s), safety_filter=True)
     command = command_of(VELOCITY, 7.0, 5.0, 15.0)

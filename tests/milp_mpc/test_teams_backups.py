@@ -281,6 +281,7 @@ def test_a_fallback_plan_is_the_rest_of_a_backup_held_to_the_horizon_and_then_br
     assert braking.u.shape == (1, HORIZON, 5)
     np.testing.assert_array_equal(braking.x[0, 0], x0)
     assert not braking.covers.any()
+    assert braking.bound == -np.inf, "nothing is proved of it"
     for steps in (3, HORIZON, HORIZON + 4):
         backup = plan_of(flown(S500, x0, [(3.0, 0.0, 0.0)] * steps), n_waypoints=1)
         backup.covers[0, min(steps, HORIZON) - 1, 0] = True

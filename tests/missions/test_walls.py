@@ -106,11 +106,9 @@ class Hovering:
         return Plan(problem.names, x, u, covers, 0.0, -np.inf, renewed=problem.names)
 
 
-@pytest.mark.parametrize(
-    # along an order, the way round the long wall is beyond the charge by the time it is taken
-    ("order", "name"),
-    [("none", "wall"), ("none", "low_wall"), ("search", "low_wall")],
-)
+# with time enough to be home: an order leaves out what a UAS could not come home from any more
+@pytest.mark.parametrize("order", ["none", "search"])
+@pytest.mark.parametrize("name", ["wall", "low_wall"])
 def test_plans_that_lead_nowhere_are_overruled_by_a_route_and_counted(monkeypatch, order, name):
     monkeypatch.setattr(moving_horizon, "decide", Hovering())
     flight = Flight(name, order).until(covered, 150)

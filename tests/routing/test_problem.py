@@ -12,7 +12,7 @@ from uas_coverage_env.planning.routing import RoutingProblem
 from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.planning.routing.terrain import Terrain
 from uas_coverage_env.scenario import Sensor, with_disturbances
-from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.vehicle.layout import DOD, VX, VY
 
 RESERVE = Reserve(
     "a test", "none", kept_s=20.0, spare_s=7.0, landing_s=5.0, legs_share=0.9, time_share=0.8
@@ -69,6 +69,16 @@ def test_batteries_last_as_long_as_those_of_the_worst_vehicle_that_is_stated(tow
     assert conditions.charge_share < 1.0
     left_s = 0.8 * conditions.charge_share * battery_s(town) - KEPT_S
     assert seen(windy).uas["budget_s"] == pytest.approx(left_s)
+
+
+def test_a_route_begins_where_its_uas_is_as_it_flies_and_ends_where_it_takes_off(town):
+    under_way = moment(town)
+    under_way.x[:, :3] += (30.0, -20.0, -5.0)
+    under_way.x[:, VX : VY + 1] = (3.0, -4.0), (0.0, 2.0)
+    uas = seen(town, swarm=under_way).uas
+    np.testing.assert_array_equal(uas["position_m"], under_way.x[:, :2])
+    np.testing.assert_array_equal(uas["velocity_mps"], [(3.0, -4.0), (0.0, 2.0)])
+    np.testing.assert_array_equal(uas["start_m"], [one.start_m[:2] for one in town.uas])
 
 
 def test_one_that_does_not_work_may_not_fly_and_takes_no_time(town):

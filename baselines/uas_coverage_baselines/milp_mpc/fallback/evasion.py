@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.fallback.backup import prolonged
-from uas_coverage_baselines.milp_mpc.model.flown import pushed
 from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.geometry.round_shapes import outside_upright_m
+from uas_coverage_env.planning.backup.braking import pushed
 from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import compile_vehicle
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.model.flown import pushed
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
+from uas_coverage_env.planning.backup.braking import pushed
 from uas_coverage_env.vehicle import compile_vehicle
 from uas_coverage_env.vehicle import layout as S
 

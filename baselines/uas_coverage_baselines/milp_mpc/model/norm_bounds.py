@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.model.flown import pushed
 from uas_coverage_env.geometry import cylinder_faces
 from uas_coverage_env.geometry.round_shapes import inner_factor
+from uas_coverage_env.planning.backup.braking import pushed
 from uas_coverage_env.vehicle import VehicleParams, compile_vehicle
 from uas_coverage_env.vehicle import layout as S
 
