@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from uas_coverage_agents.policy.actor import Actor
-from uas_coverage_agents.policy.environment import action_of, keywords_of
+from uas_coverage_agents.policy.environment import ActorRunner, action_of, keywords_of
 from uas_coverage_agents.training import packed
 from uas_coverage_agents.training.learner import Told
 from uas_coverage_agents.training.missions import Missions
@@ -14,9 +14,11 @@ from uas_coverage_agents.training.packed import PackedPpo, advantages_of
 from uas_coverage_agents.training.rounds import TrainingJob, policy_of, train
 from uas_coverage_agents.training.settings import settings_of
 
-from uas_coverage_env import generate_scenario, load_planner, rollout
+from uas_coverage_env import MissionBrief, generate_scenario, load_planner, rollout
 from uas_coverage_env.env import HOME_CHOICE, CoverageBatch
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import Assistants
+from uas_coverage_env.mission import first_sight
 
 TINY = (
     *("num_envs=2", "rounds=2", "total_timesteps=64", "size.n_uas=[2,2]"),
@@ -134,6 +136,22 @@ def test_a_masked_choice_is_never_taken_neither_in_flight_nor_with_noise():
             assert torch.isfinite(likely).all()
 
 
+def test_choices_are_drawn_in_flight_as_the_seed_of_the_mission_says_or_the_best_is_taken():
+    scenario = generate_scenario(900_501, n_uas=2, n_waypoints=8, n_obstacles=0)
+    brief = MissionBrief.of(scenario)
+    swarm = first_sight(brief)
+
+    def chosen(temperature, seed):
+        settings = tiny("ppo-waypoint", f"learning.temperature={temperature}")
+        runner = ActorRunner(policy(made(settings), settings), Assistants())
+        runner.reset(brief, seed)
+        return [runner.act(swarm)["uas_1"] for _ in range(20)]
+
+    assert chosen(100.0, 3) == chosen(100.0, 3) != chosen(100.0, 4)
+    assert len(set(map(str, chosen(100.0, 3)))) > 2
+    assert chosen(0.0, 3) == chosen(0.0, 4)
+
+
 def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
     settings = tiny("ppo-waypoint", "learning.n_steps=40")
     learner = made(settings)
@@ -239,5 +257,5 @@ def test_a_policy_of_other_outputs_than_its_action_has_is_refused():
     found = policy(made(settings), settings)
     network = found.description.network.model_copy(update={"others": 2})
     changed = type(found)(found.description.model_copy(update={"network": network}), found.tensors)
-    with pytest.raises(ValueError, match="14 outputs for action 'waypoint'"):
+    with pytest.raises(ValueError, match="outputs for action 'waypoint'"):
         keywords_of(changed)

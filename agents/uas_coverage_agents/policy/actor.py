@@ -78,6 +78,8 @@ class Actor(StrictModel):
         hidden: Widths of the layers.
         candidates: What there is to choose from; None: actions are no choices.
         others: Outputs after the candidates.
+        temperature: Choices are drawn with probabilities exp(score / this), as they were while it
+            was learned; 0: the best one is taken. UAS that see the same and never draw collide.
         nearby_m: Closeness is 1/(1 + distance / nearby_m) [m].
         environment: Keyword arguments of the environments that it flies in.
     """
@@ -91,6 +93,7 @@ class Actor(StrictModel):
     hidden: Annotated[tuple[Width, ...], Field(min_length=1, max_length=8)]
     candidates: Candidates | None = None
     others: Width
+    temperature: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     nearby_m: Annotated[float, Field(gt=0.0)]
     environment: dict[str, JsonValue]
 
@@ -114,6 +117,7 @@ class Actor(StrictModel):
         hidden: tuple[int, ...],
         width: int,
         rows: int,
+        temperature: float,
         environment: dict[str, Any],
     ) -> "Actor":
         """The network for an observation.
@@ -126,6 +130,7 @@ class Actor(StrictModel):
             hidden: See `Actor`.
             width: Of the scorer.
             rows: How many waypoints the layers see.
+            temperature: See `Actor`.
             environment: See `Actor`.
         """
         table = _columns_of(blocks)
@@ -153,6 +158,7 @@ class Actor(StrictModel):
             hidden=hidden,
             candidates=each,
             others=outputs - choices,
+            temperature=temperature,
             nearby_m=NEARBY_M,
             environment=environment,
         )

@@ -1,4 +1,4 @@
-"""Flies what acts in the environments and is run in NumPy: the same as it was learned, no noise."""
+"""Flies what acts in the environments and is run in NumPy."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -52,21 +52,29 @@ def keywords_of(policy: Policy) -> dict[str, Any]:
     return keywords
 
 
-def action_of(policy: Policy) -> Callable[[Any], Any]:
+def action_of(policy: Policy, seed: int = 0) -> Callable[[Any], Any]:
     """The policy as a function from observations (..., V) to actions.
 
     With choices it takes a mapping of `observation` and `action_mask`, as `mask_in_observation`
     makes it; what is masked is never chosen.
 
+    Args:
+        policy: Of an `Actor`.
+        seed: Of what it draws, where it draws choices.
+
     Raises:
         ValueError: See `keywords_of`.
     """
+    rng = np.random.default_rng(seed)
+    temperature = getattr(policy.description.network, "temperature", 0.0)
 
     def actions(seen: Any) -> Any:
         return np.clip(policy.forward(seen), -1.0, 1.0).astype(np.float32)
 
     def choices(seen: Any) -> Any:
         scores = policy.forward(seen["observation"])
+        if temperature > 0.0:
+            scores = scores + temperature * rng.gumbel(size=scores.shape)
         return np.where(seen["action_mask"], scores, -np.inf).argmax(axis=-1)
 
     return choices if keywords_of(policy).get("mask_in_observation") else actions
@@ -84,7 +92,8 @@ class ActorRunner:
     """
 
     def __init__(self, policy: Policy, assistants: Assistants) -> None:
-        self._planner = as_planner(action_of(policy), **keywords_of(policy))
+        self._policy, self._keywords = policy, keywords_of(policy)
+        self._planner = as_planner(action_of(policy), **self._keywords)
         self.assistants = self._planner.assistants
 
     def warm_up(self, brief: MissionBrief) -> None:
@@ -92,7 +101,8 @@ class ActorRunner:
         self._planner.warm_up(brief)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
-        """Begin a mission; nothing is drawn."""
+        """Begin a mission; what is drawn depends on the seed alone."""
+        self._planner = as_planner(action_of(self._policy, seed), **self._keywords)
         self._planner.reset(brief, seed)
 
     def act(self, swarm: SwarmState) -> Mapping[str, Command]:

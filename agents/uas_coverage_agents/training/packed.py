@@ -81,6 +81,8 @@ class PackedSettings(StrictModel):
         hidden: Widths of the layers, of policy and of values.
         width: Of the scorer of candidates; 0: there is none, choices are outputs like others.
         rows: How many of the nearest waypoints the layers see.
+        temperature: At which the policy draws its choices in flight: 1 as while it learns, 0 the
+            best one.
         missions: Of a round, from which the environments draw.
         phases: In order of their begin; the first begins at 0.
     """
@@ -98,6 +100,7 @@ class PackedSettings(StrictModel):
     hidden: Annotated[tuple[Count, ...], Field(min_length=1, max_length=8)] = (96, 64)
     width: Annotated[int, Field(ge=0, le=4096)] = 32
     rows: Count = 6
+    temperature: NotNegative = 0.5
     missions: Count = 128
     phases: Annotated[tuple[Phase, ...], Field(min_length=1)] = (Phase(),)
 
@@ -141,6 +144,7 @@ class PackedPpo:
             hidden=self._own.hidden,
             width=self._own.width,
             rows=self._own.rows,
+            temperature=self._own.temperature if rules.chooses else 0.0,
             environment=plain(self._keywords),
         )
         self._model = ActorCritic(self._network)
