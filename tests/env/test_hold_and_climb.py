@@ -100,12 +100,17 @@ def test_one_that_holds_on_its_way_home_does_not_count_as_flying_home():
 
 
 def test_return_mode_flies_home_at_its_own_height_whatever_climbs():
-    empty = practice_ground(n_uas=1, waypoints_m=((102.0, 100.0, -10.0),), max_steps=60)
-    env = env_of(empty, return_mode=True)
-    # all is covered at once: it is called home
-    infos = env.step({"uas_1": CLIMB_CHOICE})[-1]
-    assert infos["uas_1"]["returning"]
-    assert infos["uas_1"]["status"] == UasStatus.LANDED
+    one = practice_ground(n_uas=1, waypoints_m=((150.0, 100.0, -10.0),))
+    climbs, usual = (env_of(one, return_mode=True) for _ in range(2))
+    for env in (climbs, usual):
+        while not env.step({"uas_1": 0})[-1]["uas_1"]["covered"]:
+            pass
+    # nothing is left to do: it is called home
+    for _ in range(5):
+        infos = climbs.step({"uas_1": CLIMB_CHOICE})[-1]
+        usual.step({"uas_1": HOME_CHOICE})
+        assert infos["uas_1"]["returning"]
+        np.testing.assert_array_equal(climbs.swarm_state().x, usual.swarm_state().x)
 
 
 def test_a_planner_that_holds_and_climbs_is_expressed():

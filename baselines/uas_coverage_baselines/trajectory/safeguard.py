@@ -137,7 +137,7 @@ class Safeguard:
             outcome["applied_command"]["values"][u] = inputs[:DELTA_THRUST]
         for u in homeward:
             outcome["applied_command"]["kind"][u] = GO_TO
-            outcome["applied_command"]["values"][u] = HOME, 0.0, 0.0, 0.0
+            outcome["applied_command"]["values"][u, 0] = HOME
         wrenches = np.zeros((len(outcome), 5))
         codes = assistants(return_mode=False, safety_filter=True)
         at_sample = state._replace(step=np.zeros(1, np.int64))  # the arena knows the present only
