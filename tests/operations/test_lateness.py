@@ -10,8 +10,8 @@ pytest.importorskip("pyproj")
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.mission_export.scheduling import check_slack
-from uas_coverage_env.planning.execution.lateness import Timed, pairs_of
-from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, follow
+from uas_coverage_env.planning.execution.lateness import Timed, encounters, pairs_of
+from uas_coverage_env.planning.execution.leg_model import DT_S, Autopilot, Followed, follow
 from uas_coverage_env.scenario import Place, load_scenario
 
 FIELD = load_scenario("open_field")
@@ -66,6 +66,17 @@ def test_the_slack_is_no_more_careful_than_a_few_seconds(one, other):
     assume(pair.slack_s is not None)
     delays = pair.slack_s + np.arange(-2.0, 3.0, 0.2)
     assert min(least_m(a, b, sign * d) for sign in (1, -1) for d in delays) < KEPT_M + 2.0
+
+
+@pytest.mark.parametrize(("step_m", "meets"), [(11.0, True), (5.0, False)])
+def test_between_two_samples_each_may_be_half_a_step_nearer(step_m, meets):
+    # passes level with what hovers, its samples on either side beyond what is to be kept
+    nearest_m = KEPT_M + 0.5 * step_m - 0.1 if meets else KEPT_M + 0.5 * step_m + 0.1
+    places = [(0.0, nearest_m + k * step_m, -10.0) for k in range(4)]
+    moves = Followed(DT_S * np.arange(4.0), np.array(places), np.zeros(2))
+    hovers = Followed(DT_S * np.arange(3.0), np.tile([0.0, 0.0, -10.0], (3, 1)), np.zeros(2))
+    for a, b in ((moves, hovers), (hovers, moves)):
+        assert (len(encounters(a, b, KEPT_M)) > 0) == meets
 
 
 def test_paths_apart_allow_any_delay():

@@ -36,6 +36,13 @@ class InTurn:
         return {name: GoTo(int(open_[0]) if len(open_) else None) for name in swarm.active}
 
 
+class Stubborn(InTurn):
+    """Sends the second UAS on, too, whatever it is shown."""
+
+    def act(self, swarm):
+        return {"uas_1": GoTo(0), "uas_2": GoTo(1)}
+
+
 class LooksAhead(InTurn):
     """Asks for what opens soon whenever there is nothing else."""
 
@@ -68,6 +75,12 @@ def test_where_nothing_is_asked_for_the_planner_sees_and_flies_what_there_is(pai
     planner, around, swarm = pair
     assert around.act(swarm) == {"uas_1": GoTo(0), "uas_2": GoTo(0)}
     assert planner.shown == [swarm]
+
+
+def test_a_uas_that_takes_no_commands_is_sent_home_whatever_the_planner_says(pair):
+    around, swarm = Around(Stubborn()), pair[2]
+    around.reset(MissionBrief.of(meadow(STARTS_M, waypoints=PLACES)), 0)
+    assert around.act(silent(swarm, 1)) == {"uas_1": GoTo(0), "uas_2": GoTo(None)}
 
 
 def test_a_uas_that_takes_no_commands_is_shown_as_landed_and_away_and_sent_home(pair):

@@ -10,7 +10,7 @@ from uas_coverage_env import MissionBrief, rollout
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import first_sight
-from uas_coverage_env.planning.following import Following, SearchedOrder, Seen
+from uas_coverage_env.planning.following import Following, SearchedOrder, Seen, searched_order
 from uas_coverage_env.planning.following.searched_order import SearchedAgain
 from uas_coverage_env.planning.reserves import TOUR
 from uas_coverage_env.planning.routing import (
@@ -175,6 +175,24 @@ def test_it_is_searched_again_after_so_many_steps(tasks):
     for step in range(40):
         searched.routes(seen_now(step=step))
     assert tasks.asked == 4
+
+
+@pytest.mark.parametrize(("better_s", "changes"), [(0.0, False), (1.9, False), (2.1, True)])
+def test_an_order_is_changed_for_one_that_is_better_by_two_seconds(
+    tasks, monkeypatch, better_s, changes
+):
+    order = first_order(tasks(seen_now(), np.ones(6, bool)), SearchEffort(2_000), 1, 1)
+    other = dataclasses.replace(order, routes=order.routes[::-1], cost_s=order.cost_s - better_s)
+
+    def improved(problem, known, effort, seed):
+        return other if effort.moves else known
+
+    monkeypatch.setattr(searched_order, "improve_routes", improved)
+    again = SearchedOrder(tasks, order, SearchedAgain(SearchEffort(100), 1, 1))
+    expected = other if changes else order
+    routes = again.routes(seen_now())
+    assert [route.tolist() for route in routes] == [route.tolist() for route in expected.routes]
+    assert again.order.cost_s == expected.cost_s
 
 
 def test_nothing_is_searched_for_once_all_is_covered(searched, tasks):
