@@ -176,7 +176,8 @@ def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
 
 
 def test_a_flight_ends_where_its_time_runs_out():
-    learner = made(tiny("ppo-velocity", "environment.max_cycles=5"))
+    changes = "environment.max_cycles=5", "environment.return_mode=false"
+    learner = made(tiny("ppo-velocity", *changes))
     flown = packed._Flown(learner._batch(learner._own.phases[0], 0), learner._own)
     flown.collect(learner._model, 0.01)  # 8 steps of 2 missions of 2 UAS
     told = flown.tell()
