@@ -175,6 +175,15 @@ def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
     assert flown.tell()["flights"] == 0
 
 
+def test_a_flight_ends_where_its_time_runs_out():
+    changes = "environment.max_cycles=5", "environment.return_mode=false"
+    learner = made(tiny("ppo-velocity", *changes))
+    flown = packed._Flown(learner._batch(learner._own.phases[0], 0), learner._own)
+    flown.collect(learner._model, 0.01)  # 8 steps of 2 missions of 2 UAS
+    told = flown.tell()
+    assert (told["flights"], told["home"], told["lost_or_late"]) == (4, 0.0, 1.0)
+
+
 def test_advantages_look_ahead_to_an_end_and_not_beyond():
     rewards = np.array([[1.0], [2.0], [4.0]], np.float32)
     values = np.array([[0.5], [0.25], [8.0], [3.0]], np.float32)
