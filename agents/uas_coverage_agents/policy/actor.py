@@ -29,6 +29,7 @@ _Column = Annotated[int, Field(ge=0, le=100_000)]
 _Columns = Annotated[tuple[_Column, ...], Field(max_length=10_000)]
 _Vectors = Annotated[tuple[tuple[_Column, _Column, _Column], ...], Field(max_length=1000)]
 _EACH = "candidates."
+_STANDARD = "offset", "scale"
 
 
 class Candidates(StrictModel):
@@ -141,6 +142,7 @@ class Actor(StrictModel):
             if name in OF_WAYPOINTS and len(rows_of) >= choices:
                 for read, row in zip(of_each, rows_of, strict=False):
                     read.add(row)
+        north, east, *_ = table["own"][0]["velocity"]
         each = None
         if choices:
             each = Candidates(
@@ -154,7 +156,7 @@ class Actor(StrictModel):
             columns=tuple(of_all.columns),
             sharp=tuple(of_all.sharp),
             vectors=tuple(of_all.vectors),
-            velocity=table["own"][0]["velocity"][:2],
+            velocity=(north, east),
             hidden=hidden,
             candidates=each,
             others=outputs - choices,
@@ -175,7 +177,8 @@ class Actor(StrictModel):
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Name -> shape of every tensor."""
-        last, shapes = self.hidden[-1], {"offset": (self.features,), "scale": (self.features,)}
+        last = self.hidden[-1]
+        shapes: dict[str, tuple[int, ...]] = {name: (self.features,) for name in _STANDARD}
         for k, (below, above) in enumerate(pairwise((self.features, *self.hidden))):
             shapes[f"layers.{k}.weight"] = (above, below)
             shapes[f"layers.{k}.bias"] = (above,)
@@ -183,7 +186,7 @@ class Actor(StrictModel):
         shapes |= {"others.bias": (self.others,)}
         if each := self.candidates:
             parts = {
-                "offset": (each.inputs,), "scale": (each.inputs,),
+                **{name: (each.inputs,) for name in _STANDARD},
                 "one.weight": (each.width, each.inputs), "one.bias": (each.width,),
                 "all.weight": (each.width, last), "score.weight": (1, each.width),
             }  # fmt: skip

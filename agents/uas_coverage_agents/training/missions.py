@@ -76,10 +76,12 @@ class Missions:
             **more: Instead of those that the learner has chosen.
         """
         chosen = {k: v for k, v in self.environment.model_dump().items() if v is not None} | more
-        version = {"version": version_named(chosen.pop("version"))} if "version" in chosen else {}
+        version = version_named(chosen.pop("version")) if "version" in chosen else None
         if isinstance(self.origin, Task):
-            return replace(self.origin, **version).settings(**chosen)
-        return {"return_mode": True, "safety_filter": True, **version, **chosen}
+            task = self.origin if version is None else replace(self.origin, version=version)
+            return task.settings(**chosen)
+        asked = {} if version is None else {"version": version}
+        return {"return_mode": True, "safety_filter": True, **asked, **chosen}
 
     def mission(self, number: int) -> Scenario:
         """A mission to learn from, for learners that draw none themselves."""

@@ -12,7 +12,7 @@ Schulman et al. 2017 as it is usually done, on the batch of environments itself.
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
@@ -130,13 +130,8 @@ class PackedPpo:
         self._own = own_settings(settings, PackedSettings, _READ)
         self._keywords, self._steps = missions.settings(), 0
         for phase in self._own.phases:
-            if strange := phase.lesson.keys() - Scenario.model_fields.keys():
-                raise InputError(f"[learning] phases: lesson: a scenario has no {min(strange)!r}")
-            try:
-                rules = MissionSettings.of(self._paid(phase))
-            except ValueError as error:
-                raise InputError(f"[learning] phases: {error}") from error
-        self._chooses = rules.chooses
+            self._check(phase)
+        rules = MissionSettings.of(self._keywords)
         self._network = Actor.of(
             rules.observation,
             K_WAYPOINTS if rules.chooses and self._own.width else 0,
@@ -205,6 +200,14 @@ class PackedPpo:
         return Learned(
             "environment", self._network, observed(self._keywords), self._model.tensors()
         )
+
+    def _check(self, phase: Phase) -> None:
+        if strange := phase.lesson.keys() - Scenario.model_fields.keys():
+            raise InputError(f"[learning] phases: lesson: a scenario has no {min(strange)!r}")
+        try:
+            MissionSettings.of(self._paid(phase))
+        except ValueError as error:
+            raise InputError(f"[learning] phases: {error}") from error
 
     def _paid(self, phase: Phase) -> dict[str, Any]:
         """Keyword arguments of the environments in a phase."""
@@ -326,12 +329,10 @@ class _Flown:
             values[steps][last] = model.values(model.read(batch.observation[last])[0]).numpy()
         own = self._own
         advantages = advantages_of(rewards, values, ended, own.gamma, own.gae_lambda)
-        parts = [
-            None if one[0] is None else torch.cat(one) for one in map(list, zip(*kept, strict=True))
-        ]
+        read, each, masks, actions, likely = map(_joined, zip(*kept, strict=True))
         gained = torch.from_numpy(advantages[decided])
         returns = gained + torch.from_numpy(values[:-1][decided])
-        return Rows(*parts, advantages=gained, returns=returns)  # pyrefly: ignore[missing-argument]
+        return Rows(read, each, masks, actions, likely, gained, returns)
 
     def tell(self) -> dict[str, float]:
         """Of the UAS whose flights ended since the last time: how, with the noise of learning."""
@@ -377,6 +378,11 @@ def advantages_of(
         error = rewards[t] + gamma * goes_on * values[t + 1] - values[t]
         later = found[t] = error + gamma * gae_lambda * goes_on * later
     return found
+
+
+def _joined(parts: Sequence[Any]) -> Any:
+    """Of all steps, one after the other; None where there are none."""
+    return None if parts[0] is None else torch.cat(tuple(parts))
 
 
 def _drawn(outputs: Tensor, masks: Tensor | None, noise: float) -> tuple[Tensor, Tensor]:
