@@ -104,7 +104,7 @@ def trained(name: str, which: str, seed: int, given: argparse.Namespace) -> tupl
     waits = 1.0 - model.num_timesteps / counted.rows
     cells = name, f"{seed}", which, f"{100.0 * waits:.0f}", f"{model.num_timesteps:,}"
     covered, value = 100.0 * found.mean("coverage"), found.score.value
-    return *cells, f"{covered:.0f}", f"{home} of {fleet}", f"{value:.2f}"
+    return *cells, f"{covered:.0f}", f"{home} of {fleet}", "-" if value is None else f"{value:.2f}"
 
 
 if __name__ == "__main__":

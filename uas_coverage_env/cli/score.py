@@ -85,7 +85,7 @@ def score_command(
         opened(out, DESCRIPTION, Row, overwrite=overwrite) as store,
     ):
         refuse_former(store, every)
-        trouble = fly_and_keep(every, store, workers, screen)
+        trouble = fly_and_keep(every, store, workers, screen) if every else None
         found = {row.key: row for row in store.rows()}
     for name, some in entries.items():
         flown: dict[str, list[MissionScore]] = {}
