@@ -105,8 +105,7 @@ class CoverageParallelEnv(Versioned, ParallelEnv[str, NDArray[np.float32], Any])
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
             data. To draw a scenario at each reset: the name of a family (`generated`), a
             `MissionSource`, or any function `generator(rng) -> Scenario`.
-        action: "velocity", "acceleration", "wrench" or "waypoint", in v1 also "planar"; or an
-            `ActionKind`.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.

@@ -76,8 +76,7 @@ class CoverageBatch:
         threads: How many of numba's threads share the lanes, `NUMBA_NUM_THREADS` at most. They wait
             for work by spinning: on a busy machine set `OMP_WAIT_POLICY=passive`.
         version: Of the environments, or its name.
-        action: "velocity", "acceleration", "wrench" or "waypoint", in v1 also "planar"; or an
-            `ActionKind`.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.

@@ -64,8 +64,7 @@ class MissionSettings:
     """What the environments take as keyword arguments, whatever their interface.
 
     Attributes:
-        action: "velocity", "acceleration", "wrench" or "waypoint", in v1 also "planar"; or an
-            `ActionKind`.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.
