@@ -1,6 +1,7 @@
 """Publish the scores of `uas-coverage score`: anchors and the tables of docs/level_scores.md.
 
     uas-coverage score --level easy,medium,hard,extreme --missions 50 --out scores
+    uas-coverage score --level easy-v1,medium-v1,hard-v1,extreme-v1 --missions 50 --out scores
     python benchmarks/levels.py scores
 
 Writes the interquartile means of the values of the random policy and of the best planner on the
@@ -22,7 +23,8 @@ import numpy as np
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.statistics import iqm
 from uas_coverage_env.runner.store import rows_in
-from uas_coverage_env.tasks import LEVELS, SPLITS
+from uas_coverage_env.tasks import SPLITS, level_named
+from uas_coverage_env.tasks.levels import level_names
 from uas_coverage_env.tasks.scoring import RANDOM, Anchors, MissionScore, scored
 from uas_coverage_env.tasks.table import markdown
 
@@ -40,7 +42,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path, help="The --out of `uas-coverage score`.")
     flown = missions_in(parser.parse_args().folder)
-    anchors = {level: anchors_from(planners) for level, planners in flown.items()}
+    anchors = json.loads(ANCHORS.read_text("utf-8"))  # those of levels not flown stay
+    for level, planners in flown.items():
+        found = anchors_from(planners)
+        first = level == level_named(level).level
+        anchors[level] = found if first else {"random": found["random"]}
     ANCHORS.write_text(json.dumps(anchors, indent=2) + "\n", encoding="utf-8")
     text = PAGE.read_text("utf-8")
     before, first, rest = text.partition(FIRST)
@@ -74,10 +80,10 @@ def anchors_from(planners: Mapping[str, Sequence[MissionScore]]) -> dict[str, An
 def tables(flown: Flown) -> str:
     """The tables of all levels that were flown."""
     parts = []
-    for level, task in LEVELS.items():
+    for level in level_names():
         if level in flown:
             scores = {planner: scored(level, each) for planner, each in flown[level].items()}
-            parts.append(f"\n`{task.id}`\n\n{markdown(scores)}\n")
+            parts.append(f"\n`{level_named(level).id}`\n\n{markdown(scores)}\n")
     return "".join(parts) + "\n"
 
 

@@ -29,10 +29,10 @@ from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, 
 PAGE = Path(__file__).parents[1] / "docs" / "level_scores.md"
 FIRST, LAST = "<!-- reference learners: {} -->\n", "<!-- end of reference learners: {} -->"
 REFERENCE = sorted(
-    path.stem for path in FOLDER.glob("*.toml") if not path.stem.startswith("learned-")
+    path.stem for path in FOLDER.glob("*.toml") if not path.stem.startswith(("learned-", "ppo-"))
 )
 HEAD = (
-    "learner", "steps", "processor time, s", "trainings", "score [95 %]", "covered, %",
+    "learner", "flown steps", "processor time, s", "trainings", "score [95 %]", "covered, %",
     "lost or not home", "energy, %", "return", "missions",
 )  # fmt: skip
 
@@ -112,7 +112,7 @@ def result_of(name: str, learner: LearnerSettings, given: argparse.Namespace) ->
 
     def told(progress: TrainingProgress) -> None:
         which = f"{level}, {name}-{progress.job.seed}"
-        sys.stderr.write(f"{which}: round {progress.rounds}, {progress.steps} steps\n")
+        sys.stderr.write(f"{which}: round {progress.rounds}, {progress.steps} flown steps\n")
 
     with Workers(given.jobs) as workers:
         policies = train(jobs, Validation(workers), told)

@@ -3,7 +3,7 @@
 import inspect
 import re
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,13 +15,19 @@ from uas_coverage_env.env import (
     CoverageParallelEnv,
     CoverageSwarmEnv,
 )
-from uas_coverage_env.env.actions import ACTIONS, HOME_CHOICE
+from uas_coverage_env.env.actions import (
+    CLIMB_CHOICE,
+    HOLD_CHOICE,
+    HOME_CHOICE,
+    ActionKind,
+)
 from uas_coverage_env.env.actions.given import actions_of
 from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 from uas_coverage_env.env.batch.memory import FINAL, LANES
 from uas_coverage_env.env.episode.memory import LEARNERS
 from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, inside_name
 from uas_coverage_env.env.observation import OBSERVATION, grid
+from uas_coverage_env.env.observation.block import Group
 from uas_coverage_env.env.rendering.screen import RENDER_MODES
 
 SCENARIO = "village"
@@ -53,10 +59,10 @@ def environment_summary() -> str:
     return table((env.metadata["name"], ""), rows)
 
 
-def observation_groups() -> str:
-    """The groups of the default observation, and where each lies."""
+def observation_groups(blocks: Sequence[Group] = OBSERVATION) -> str:
+    """The groups of an observation, and where each lies."""
     rows, start = [], 0
-    for group in OBSERVATION:
+    for group in blocks:
         n, features = group.width * group.repeats, ", ".join(f.name for f in group.features)
         many = f", {group.repeats} × {group.width} numbers" if group.repeats > 1 else ""
         rows.append((f"{start}-{start + n - 1}", f"`{group.name}`{many}", features))
@@ -70,16 +76,16 @@ def picture_channels() -> str:
     return table(("channel", "name", "meaning"), rows)
 
 
-def action_tables() -> str:
+def action_tables(kinds: Sequence[ActionKind]) -> str:
     """What each number of each kind of action means, for the shipped vehicle in the village."""
     scenario = load_scenario(SCENARIO)
     rows = []
-    for kind in ACTIONS:
+    for kind in kinds:
         actions = actions_of(kind, scenario)
         one, all_ = _shown(actions.space()), _shown(actions.joint_space(len(scenario.uas)))
         rows.append((f"`{kind.name}`", f"`{one}`", f"`{all_}`"))
     parts = [table(("`action`", "one UAS", "the swarm as one agent (two UAS)"), rows)]
-    for kind in ACTIONS:
+    for kind in kinds:
         if kind.choices:
             continue
         ranges = actions_of(kind, scenario).ranges[0]
@@ -91,7 +97,11 @@ def action_tables() -> str:
     choices = [
         (f"0 … {HOME_CHOICE - 1}", "that one of the nearest open waypoints, nearest first"),
         (str(HOME_CHOICE), "home"),
+        (str(HOLD_CHOICE), "nowhere: it holds where it is"),
+        (str(CLIMB_CHOICE), "where it is flying already, and climbs"),
     ]
+    n_choices = max(kind.choices for kind in kinds)
+    choices = choices[: n_choices - HOME_CHOICE + 1]
     parts += ["**waypoint**", table(("choice", "flies to"), choices)]
     return "\n\n".join(parts)
 
@@ -196,6 +206,11 @@ def without_meanings(rows: str) -> str:
     """Of a table of features, the columns of indices and names."""
     cut = [line.split("|")[1:3] for line in rows.splitlines()]
     return "\n".join(f"|{index}|{feature}|" for index, feature in cut)
+
+
+def without_index(rows: str) -> str:
+    """A table of features without the column of indices."""
+    return "\n".join(f"|{line.split('|', 2)[2]}" for line in rows.splitlines())
 
 
 _SETTING = re.compile(r"^( +)action: (?:.*\n)+?\1 +.*as in the version\.\n", re.MULTILINE)

@@ -29,6 +29,7 @@ from environment_tables import (
     observation_groups,
     picture_channels,
     with_settings_written_out,
+    without_index,
     without_meanings,
 )
 from families_picture import families_table
@@ -41,17 +42,21 @@ from uas_coverage_env.env import (
     CoverageSwarmEnv,
     CoverageVectorEnv,
 )
+from uas_coverage_env.env.actions import ACTIONS, ACTIONS_V1
 from uas_coverage_env.env.api.aec import in_turns
 from uas_coverage_env.env.gpu.refused import REFUSED
 from uas_coverage_env.env.observation import OBSERVATION_SIZE, full_state, local
 from uas_coverage_env.env.observation.layout import layout_table
+from uas_coverage_env.env.observation.ways import WAYS
 from uas_coverage_env.env.rewards.terms import rewards_table
+from uas_coverage_env.env.versions import V1
 from uas_coverage_env.flight import Why, figures
 from uas_coverage_env.flight.registry import GROUP, KINDS, PlannerDescription, describe_planners
 from uas_coverage_env.leaderboard.scores import columns
 from uas_coverage_env.planning.reserves import RESERVES, Reserve
 from uas_coverage_env.scenario.events import EVENT_KINDS
 from uas_coverage_env.scenario.schema import scenario_schema
+from uas_coverage_env.tasks import LESSONS
 
 DOCS = Path(__file__).resolve().parent
 SCHEMA = DOCS / "scenario.schema.json"
@@ -247,12 +252,16 @@ PARTS: dict[str, Callable[[], str]] = {
     "environments": environments,
     "environment_summary": environment_summary,
     "observation_groups": observation_groups,
+    "observation_groups_v1": partial(observation_groups, V1.observation),
+    "observation_ways": lambda: without_index(layout_table((WAYS,))),
     "observations": lambda: f"{OBSERVATION_SIZE} numbers.\n\n{layout_table()}",
     "observation_local": lambda: without_meanings(layout_table(local())),
     "observation_grid": picture_channels,
     "observation_full_state": lambda: layout_table(full_state(2, 3, 1)),
-    "actions": action_tables,
+    "actions": partial(action_tables, ACTIONS),
+    "actions_v1": partial(action_tables, [kind for kind in ACTIONS_V1 if kind not in ACTIONS]),
     "rewards": rewards_table,
+    "rewards_v1": partial(rewards_table, V1.reward),
     "infos": docstring_section("Infos"),
     "starting_state": docstring_section("Starting State"),
     "episode_end": docstring_section("Episode End"),
@@ -268,6 +277,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "learner_settings": learner_settings,
     "not_on_a_gpu": lambda: table(
         ("does not run on a GPU", "instead"), [(row.what, row.instead) for row in REFUSED]
+    ),
+    "lessons": lambda: table(
+        ("lesson", "what is easier"), [(f"`{name}`", one.meaning) for name, one in LESSONS.items()]
     ),
     "left_open": lambda: table(("`why`", "what it means"), [(f"`{w}`", w.meaning) for w in Why]),
     **{name: partial(of_operations, name) for name in OPERATIONS},

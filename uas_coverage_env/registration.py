@@ -31,10 +31,11 @@ def register_environments() -> None:
         _register_gymnasium(f"UASCoverage-{version}", module)
         _register_pettingzoo("parallel", f"uas/coverage-{version}", f"{module}:parallel_env")
         _register_pettingzoo("aec", f"uas/coverage-{version}", f"{module}:env")
-    for level in LEVEL_NAMES:
-        _register_gymnasium(f"UASCoverage/{level.capitalize()}-v0", _TASKS, level=level)
-        name, found = f"uas/coverage-{level}-v0", f"{_TASKS}:parallel_env"
-        _register_pettingzoo("parallel", name, found, level=level)
+        for level in LEVEL_NAMES:
+            of = level if version == "v0" else f"{level}-{version}"
+            _register_gymnasium(f"UASCoverage/{level.capitalize()}-{version}", _TASKS, level=of)
+            name, found = f"uas/coverage-{level}-{version}", f"{_TASKS}:parallel_env"
+            _register_pettingzoo("parallel", name, found, level=of)
 
 
 def _register_gymnasium(name: str, module: str, **kwargs: str) -> None:

@@ -14,6 +14,7 @@ from uas_coverage_agents.training.settings import (
 )
 
 from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.leaderboard import PlannerSpec
 from uas_coverage_env.scenario import sample_scenario
 from uas_coverage_env.tasks import LEVELS
 
@@ -133,3 +134,13 @@ def test_only_classes_that_are_announced_need_no_trust():
     hidden = {"policy_kwargs": {"features": ["subprocess:run"]}}
     found = authors_own(LearnerSettings(algorithm="ppo", policy="mine:Net", learning=hidden))
     assert found == ["mine:Net", "subprocess:run"]
+
+
+def test_a_training_learns_on_a_lesson_and_says_so():
+    missions = Missions.of(settings_of("ippo", scenario="hard:landing+assisted"))
+    assert missions.settings()["safety_filter"]
+    assert missions.mission(0).landing_distance_m > 2.0
+    (entry,) = missions.entries(PlannerSpec.named("hover", "hover"), 1)
+    assert (entry.level, entry.return_mode) == ("hard:landing+assisted", True)
+    with pytest.raises(InputError, match="scenario 'hard:flying': lesson is 'flying'"):
+        Missions.of(settings_of("ippo", scenario="hard:flying"))

@@ -53,8 +53,8 @@ def test_making_an_environment_is_silent():
         "import gymnasium, pettingzoo, uas_coverage_env\n"
         "from uas_coverage_env import uas_coverage_v0\n"
         "for env in (uas_coverage_v0.parallel_env(), uas_coverage_v0.env(),\n"
-        "            gymnasium.make('UASCoverage-v0', scenario='village'),\n"
-        "            pettingzoo.make('parallel', 'uas/coverage-v0')):\n"
+        "            gymnasium.make('UASCoverage-v1', scenario='village'),\n"
+        "            pettingzoo.make('parallel', 'uas/coverage-v1')):\n"
         "    env.reset(seed=0)\n"
     )
     assert out == ""

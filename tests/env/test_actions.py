@@ -11,8 +11,8 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import GoTo, UasStatus, uas_coverage_v0
 from uas_coverage_env.env import HOME_CHOICE, K_WAYPOINTS
+from uas_coverage_env.env.actions import ACTIONS, ACTIONS_V1
 from uas_coverage_env.env.actions.given import actions_of
-from uas_coverage_env.env.actions.kinds import ACTION_NAMES
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.wrench import WRENCH
 from uas_coverage_env.scenario import load_scenario
@@ -254,15 +254,24 @@ ANYTHING = st.one_of(
 
 
 @functools.cache
-def fuzzed(name):
-    return uas_coverage_v0.parallel_env("village", action=name)
+def fuzzed(kind):
+    return uas_coverage_v0.parallel_env("village", action=kind)
 
 
-@pytest.mark.parametrize("name", ACTION_NAMES)
+KINDS = [
+    pytest.param(kind, id=f"{kind.name} {version}")
+    for version, kinds in (("v0", ACTIONS), ("v1", ACTIONS_V1))
+    for kind in kinds
+    if version == "v0" or kind not in ACTIONS
+]
+NUMBERS_OF_A_BOX = [kind for kind in KINDS if not kind.values[0].choices]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(data=st.data())
-def test_whatever_is_given_is_flown_or_refused_and_nothing_becomes_nan(name, data):
-    env = fuzzed(name)
+def test_whatever_is_given_is_flown_or_refused_and_nothing_becomes_nan(kind, data):
+    env = fuzzed(kind)
     env.reset()
     for _ in range(3):
         before = snapshot(env)
@@ -282,11 +291,11 @@ def test_whatever_is_given_is_flown_or_refused_and_nothing_becomes_nan(name, dat
             assert np.isfinite(env.state()).all()
 
 
-@pytest.mark.parametrize("name", ["velocity", "acceleration", "wrench"])
+@pytest.mark.parametrize("kind", NUMBERS_OF_A_BOX)
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_extreme_but_valid_actions_never_leave_the_observation_space(name, seed):
-    env = fuzzed(name)
+def test_extreme_but_valid_actions_never_leave_the_observation_space(kind, seed):
+    env = fuzzed(kind)
     rng = np.random.default_rng(seed)
     env.reset()
     size = env.action_space("uas_1").shape

@@ -292,3 +292,20 @@ def test_lanes_tell_which_uas_fly():
     np.testing.assert_array_equal(batch.flying, [[True, False, False]])
     assert (batch.worlds.uas["status"][0] == [FLYING, ABSENT, ABSENT]).all()
     assert batch.swarm_state(0).names == ("uas_1",)
+
+
+@pytest.mark.parametrize("step", [1, 3])
+@pytest.mark.parametrize("autoreset", ["rest", "next_step", "same_step"])
+def test_a_uas_decides_where_its_action_changes_what_comes(autoreset, step):
+    # after three steps every mission is cut, while all fly
+    batches = [CoverageBatch(3, MIXED, autoreset=autoreset, max_cycles=3) for _ in range(2)]
+    for batch in batches:
+        batch.reset(seed=0)
+        for _ in range(step):
+            batch.step(np.zeros((3, batch.n_uas, 3)))
+    decided = batches[0].deciding
+    for batch, asked in zip(batches, (0.0, 0.5), strict=True):
+        batch.step(np.full((3, batch.n_uas, 3), asked))
+    one, other = (batch.worlds.x for batch in batches)
+    np.testing.assert_array_equal((one != other).any(axis=2), decided)
+    assert decided.any() == (step == 1 or autoreset == "same_step")

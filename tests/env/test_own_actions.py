@@ -21,11 +21,15 @@ from practice_grounds import practice_ground
 
 from uas_coverage_env import UasStatus, uas_coverage_v0
 from uas_coverage_env.env import ActionKind, CoverageBatch
-from uas_coverage_env.env.actions import ACTIONS
+from uas_coverage_env.env.actions import ACTIONS, ACTIONS_V1
+from uas_coverage_env.env.actions.planar import PLANAR
+from uas_coverage_env.env.actions.velocity import VELOCITY_V1
+from uas_coverage_env.env.actions.waypoint import WAYPOINT_V1
 from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.layout import VX, VY, VZ
 
-OWN = [CLIMB_RATE, heading_and_speed(5.0), MANOEUVRES]
+# those of another version are own kinds to v0
+OWN = [CLIMB_RATE, heading_and_speed(5.0), MANOEUVRES, VELOCITY_V1, PLANAR, WAYPOINT_V1]
 NAMES = [kind.name for kind in OWN]
 LIMITS = load_vehicle("s500_v2").limits
 
@@ -174,7 +178,7 @@ def test_an_environment_with_an_own_kind_can_be_pickled():
 
 
 def test_every_kind_of_the_package_says_what_it_is():
-    for kind in ACTIONS:
+    for kind in (*ACTIONS, *ACTIONS_V1):
         assert kind.meaning.endswith(".")
         assert bool(kind.numbers) != bool(kind.choices)
 

@@ -227,11 +227,11 @@ def test_the_short_way_to_many_missions_is_the_fast_one():
 
 
 def test_a_version_that_is_gone_names_the_one_that_follows(monkeypatch):
-    monkeypatch.setattr(registration, "version_names", lambda: ("v2", "v3"))
-    with pytest.raises(ImportError, match="uas_coverage_v1 is gone; take uas_coverage_v2"):
-        exec("from uas_coverage_env import uas_coverage_v1")
-    with pytest.raises(AttributeError, match="uas_coverage_v4"):
-        _ = uas_coverage_env.uas_coverage_v4
+    monkeypatch.setattr(registration, "version_names", lambda: ("v8", "v9"))
+    with pytest.raises(ImportError, match="uas_coverage_v7 is gone; take uas_coverage_v8"):
+        exec("from uas_coverage_env import uas_coverage_v7")
+    with pytest.raises(AttributeError, match="uas_coverage_v10"):
+        _ = uas_coverage_env.uas_coverage_v10
 
 
 def test_missions_that_have_ended_wait_where_they_rest():

@@ -310,7 +310,9 @@ def _write_safe(
 
 
 @allocating_kernel
-def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None):
+def guide(
+    arena, i, x, reference, target, stop, nonlinear, command, belief=None, climb_m=0.0
+):  # fmt: skip
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 
     The wish (fly along the route, in time over low roofs) is flown as far as it leaves room to
@@ -326,6 +328,7 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
         nonlinear: Whether the world flies the 6-DOF plant.
         command: A record of COMMAND_DTYPE; kind and values are written.
         belief: (N_BELIEF,) of its inner loop; None: in still air.
+        climb_m: By how much to climb above where it is; 0: it flies at the height of the way [m].
     """
     end_x, end_y, altitude1_m, way_m, leg, stop = _next_leg(arena, i, x, target, stop, belief)
     lead_s = LEAD_S
@@ -345,6 +348,8 @@ def guide(arena, i, x, reference, target, stop, nonlinear, command, belief=None)
         arena, i, x, target, stop, brakes_late, distance_m, leg, altitude1_m
     )
     speed_mps = min(speed_mps, approach_mps)
+    if climb_m > 0.0:
+        needed_m = max(needed_m, climb_m - x[S.Z])
     altitude_m = _altitude(arena, i, x, altitude1_m, way_m, needed_m)
     north_mps, east_mps = 0.0, 0.0
     if distance_m > _NOWHERE_M:
@@ -369,6 +374,7 @@ def steer(arena, state, nonlinear, outcome):
         if state.uas[i].returning:
             command.kind = GO_TO
             command.values[0] = HOME
+            command.values[1] = 0.0
             command.returning = True
             outcome[i].returning = True
         if command.kind == GO_TO:
@@ -376,7 +382,7 @@ def steer(arena, state, nonlinear, outcome):
             stop = comes_to_rest(arena, state, target)
             guide(
                 arena, i, state.x[i], state.uas[i].reference_mps[:], target, stop, nonlinear,
-                command, state.uas[i].belief[:],
+                command, state.uas[i].belief[:], command.values[1],
             )  # fmt: skip
 
 
@@ -400,6 +406,7 @@ def velocity_of(
     given = outcome[i]["applied_command"]
     given["kind"] = GO_TO
     given["values"][0] = HOME if command.waypoint is None else command.waypoint
+    given["values"][1] = command.climb_m
     # return mode would be obeyed instead
     uas = state.uas.copy()
     uas["returning"] = False

@@ -89,10 +89,13 @@ class GoTo:
     Attributes:
         waypoint: Index in the scenario's waypoints; None is the UAS's own start.
         mode: As in `Velocity`; None means "return" for home and "transit" for a waypoint.
+        climb_m: [m] by how much to climb above where it is now, as far as the fence allows; 0: it
+            flies at the height of the way. Given again and again, it passes over what is ahead.
     """
 
     waypoint: int | None
     mode: Mode | None = None
+    climb_m: float = 0.0
 
 
 Command = Velocity | Acceleration | Wrench | GoTo
@@ -172,7 +175,10 @@ def _row(name: str, command: Any, n_waypoints: int) -> tuple[int, tuple[float, .
         )
     returning = command_mode(command) == "return"
     if kind is None:
-        return GO_TO, (_target(name, command.waypoint, n_waypoints), 0.0, 0.0, 0.0), returning
+        climb_m = _number(name, "climb_m", command.climb_m)
+        if climb_m < 0.0:
+            raise ValueError(f"command of {name}: climb_m is {climb_m:g}; give 0 or more")
+        return GO_TO, (_target(name, command.waypoint, n_waypoints), climb_m, 0.0, 0.0), returning
     values = tuple(
         _number(name, field, getattr(command, field)) for field in _NUMBERS[type(command)]
     )

@@ -5,11 +5,13 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
-from uas_coverage_env.env.actions import ACTIONS, ActionKind
+from uas_coverage_env.env.actions import ACTIONS, ACTIONS_V1, ActionKind
 from uas_coverage_env.env.observation import OBSERVATION, ObservationBlock
-from uas_coverage_env.env.observation.named import OBSERVATIONS
+from uas_coverage_env.env.observation.layout import OBSERVATION_V1
+from uas_coverage_env.env.observation.named import OBSERVATIONS, OBSERVATIONS_V1
 from uas_coverage_env.env.report import INFOS, InfoField
 from uas_coverage_env.env.rewards import REWARD, RewardTerm
+from uas_coverage_env.env.rewards.version_1 import REWARD_V1
 from uas_coverage_env.registration import version_names
 
 
@@ -88,8 +90,21 @@ class Version:
 V0 = Version("v0", OBSERVATION, REWARD, ACTIONS, observations=OBSERVATIONS)
 """The first version."""
 
+V1 = Version(
+    "v1", OBSERVATION_V1, REWARD_V1, ACTIONS_V1, observations=OBSERVATIONS_V1, flat_infos=True
+)
+"""As hard as the first, and learnable: see docs/versions.md."""
 
-def version_named(name: str) -> Version:
-    """The version of the module `uas_coverage_NAME`."""
+
+def version_named(name: str | Version) -> Version:
+    """The version of the module `uas_coverage_NAME`; a version itself stays.
+
+    Raises:
+        ValueError: There is none.
+    """
+    if isinstance(name, Version):
+        return name
+    if name not in version_names():
+        raise ValueError(f"version is {name!r}; it is one of {', '.join(version_names())}")
     version: Version = import_module(f"uas_coverage_env.uas_coverage_{name}").VERSION
     return version

@@ -68,6 +68,7 @@ def flown(entry: Entry, on_step: Callable[[Progress], object] | None = None) -> 
             dynamics=entry.dynamics,
             return_mode=entry.return_mode,
             safety_filter=entry.safety_filter,
+            reward=entry.environment.reward,
             reward_weights=entry.reward_weights,
             on_step=on_step,
         )

@@ -7,6 +7,7 @@ from importlib.metadata import version
 from typing import Any
 
 from uas_coverage_env.entities.codes import DynamicsName
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
 from uas_coverage_env.leaderboard.planner_specs import PlannerSpec
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
@@ -27,6 +28,7 @@ class Entry:
         dynamics: `lpv` or `nonlinear`.
         safety_filter: Whether the world keeps commands clear of harm; None: as the planner asks.
         return_mode: Whether the world brings UAS home in time; None: as the planner asks.
+        environment: Version of the environments whose reward is recorded; a level's name says it.
         reward_weights: Of the terms whose weights are not the default ones.
         level: Of which the mission is; empty where of none.
     """
@@ -38,6 +40,7 @@ class Entry:
     dynamics: DynamicsName = "lpv"
     safety_filter: bool | None = None
     return_mode: bool | None = None
+    environment: Version = V0
     reward_weights: Mapping[str, float] = field(default_factory=dict)
     level: str = ""
 

@@ -1,7 +1,7 @@
 """Missions of a level flown side by side: what a policy scores, in the time of a few."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +10,29 @@ from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.api.forms import shown
 from uas_coverage_env.env.report import COVERED, ENERGY, FIRST_TERM, STATUS
+from uas_coverage_env.env.versions import Version
 from uas_coverage_env.flight.metrics import covered_share, share_of_available
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.simulation.world import visits_to_come
 
 BatchPolicy = Callable[[Any], Any]
 """From observations (N, …) of N UAS, or swarms, to N actions."""
+
+
+class BatchedPolicy(NamedTuple):
+    """What a planner that is a policy offers as `in_batch`, where it answers many rows at once.
+
+    Attributes:
+        policy: See `BatchPolicy`.
+        swarm_of: It is one for whole swarms of so many UAS; None: for one UAS.
+        version: Of the environments that it belongs to.
+        chosen: Its choice of the settings of a level, see `Task.settings`.
+    """
+
+    policy: BatchPolicy
+    swarm_of: int | None
+    version: Version
+    chosen: Mapping[str, Any]
 
 
 def flown_in_batches(
@@ -94,7 +111,7 @@ def _actions(
     asked = np.zeros(batch.learners.asked.shape)
     masks = batch.action_masks() if settings.mask_in_observation else None
     if swarm_of is None:
-        acts = batch.flying & flies[:, np.newaxis]
+        acts = batch.deciding
         told = shown(settings, seen[acts], None if masks is None else masks[acts])
         asked[acts] = np.asarray(policy(told)).reshape(-1, asked.shape[2])
     else:

@@ -1,14 +1,19 @@
 """The levels, as data."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
+from uas_coverage_env.env.versions import version_named
 from uas_coverage_env.features.motor import MotorDegraded
 from uas_coverage_env.features.radio import RadioLost
+from uas_coverage_env.registration import version_names
 from uas_coverage_env.scenario import Family, Scenario
 from uas_coverage_env.scenario.families import BUILT_IN
-from uas_coverage_env.tasks.task import Task
+from uas_coverage_env.tasks.lessons import LESSONS
+from uas_coverage_env.tasks.task import Task, level_name
 
 _BOTH = ("s500_v2", "hexacopter")
 _WINDOW = (20.0, 120.0)  # when something fails [s]
@@ -85,15 +90,41 @@ LEVELS: Mapping[str, Task] = {
         ),
     )
 }  # fmt: skip
-"""Name -> level, from easy to hard."""
+"""Name -> level, from easy to hard, in the first version of the environments."""
 
 
+@cache
+def level_names() -> tuple[str, ...]:
+    """The names of all levels: those of the first version, then `easy-v1` and so on."""
+    return tuple(level_name(level, version) for version in version_names() for level in LEVELS)
+
+
+@cache
 def level_named(name: str) -> Task:
-    """The level of a name.
+    """The level of a name: `hard`, or `hard-v1` for that of another version.
+
+    With lessons behind a colon, `hard:landing` or `hard:landing+few`, it is the level with these
+    made easier, to learn on (`LESSONS`).
 
     Raises:
         ValueError: There is none.
     """
-    if name not in LEVELS:
-        raise ValueError(f"level is {name!r}; it is one of {', '.join(LEVELS)}")
-    return LEVELS[name]
+    level, colon, lessons = name.partition(":")
+    if level not in level_names():
+        raise ValueError(f"level is {level!r}; it is one of {', '.join(level_names())}")
+    if colon:
+        return _with_lessons(level_named(level), lessons)
+    if name in LEVELS:
+        return LEVELS[name]
+    level, _, version = name.rpartition("-")
+    return replace(LEVELS[level], version=version_named(version))
+
+
+def _with_lessons(task: Task, names: str) -> Task:
+    for name in names.split("+"):
+        if name not in LESSONS:
+            raise ValueError(f"lesson is {name!r}; it is one of {', '.join(LESSONS)}")
+        lesson = LESSONS[name]
+        easier = task.easier if lesson.of is None else (*task.easier, lesson.of)
+        task = replace(task, lesson=names, easier=easier, **lesson.task)
+    return task

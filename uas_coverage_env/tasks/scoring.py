@@ -39,7 +39,7 @@ from uas_coverage_env.leaderboard.statistics import Estimate, estimate
 from uas_coverage_env.leaderboard.sweep import Entry
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.tasks.in_batch import flown_in_batches
+from uas_coverage_env.tasks.in_batch import BatchedPolicy, flown_in_batches
 from uas_coverage_env.tasks.levels import level_named
 from uas_coverage_env.tasks.task import Task
 
@@ -117,10 +117,14 @@ def mission_value(flown: Any) -> float:
 
 
 def anchors_of(level: str) -> Anchors | None:
-    """The published anchors of a level; None: there are none yet."""
-    text = (files("uas_coverage_env.tasks") / "anchors.json").read_text("utf-8")
-    found = json.loads(text).get(level)
-    return None if found is None else Anchors(**found)
+    """The published anchors of a level; None: there are none yet.
+
+    The best planner flies the same in all versions of the environments, random actions do not.
+    """
+    published = json.loads((files("uas_coverage_env.tasks") / "anchors.json").read_text("utf-8"))
+    if level not in published:
+        return None
+    return Anchors(**{**published.get(level_named(level).level, {}), **published[level]})
 
 
 def score(
@@ -136,7 +140,10 @@ def score(
 ) -> Score:
     """Fly the first missions of a split and score them.
 
-    The seeds of the missions, `seeds_of(split)[:missions]`, are in `Score.missions`.
+    The seeds of the missions are `seeds_of(split)[:missions]`. A seed draws the mission, and in its
+    flight whatever disturbances draw (gusts): `CoverageBatch.reset(seeds, scenarios=...)` flies the
+    same. Other seeds are other gusts, which move single missions of `hard` by up to half a point,
+    and means of 50 by some 0.03.
 
     Args:
         planner: `random`, the name of a planner, a planner, or a policy: a function from
@@ -147,9 +154,10 @@ def score(
         split: validation or test.
         swarm_of: For a policy of the whole swarm, see `as_planner`.
         batch: For a policy that takes the observations of many at once, (N, …), and returns N
-            actions: how many missions are flown side by side, which is much faster. The same values
-            to the last digit, where it answers each row as it would by itself; figures that a
-            batch does not measure are None. None: missions are flown one by one.
+            actions, and for `policy:DIR` of what a library has learned: how many missions are flown
+            side by side, which is much faster. The same values to the last digit, where it answers
+            each row as it would by itself; figures that a batch does not measure are None. None:
+            missions are flown one by one.
         on_mission: Called with each mission that was flown.
         **chosen: For a policy: action, observation and so on, where they are not the level's.
 
@@ -212,8 +220,9 @@ def entry_of(spec: PlannerSpec, task: Task, seed: int, scenario: Scenario) -> En
         seed,
         safety_filter=task.safety_filter,
         return_mode=task.return_mode,
+        environment=task.version,
         reward_weights=task.reward_weights,
-        level=task.level,
+        level=task.name,
     )
 
 
@@ -235,6 +244,10 @@ def _flown_side_by_side(
     chosen: Mapping[str, Any],
 ) -> Iterator[MissionScore]:
     """Missions of a level as a policy flies them, many at once."""
+    offered = batched(policy, task)
+    if offered is not None:
+        policy, swarm_of, _, own = offered
+        chosen = {**own, **chosen}
     if not callable(policy) or hasattr(policy, "act"):
         raise ValueError(
             f"batch is {batch}, and {policy!r} is no policy; give a function from observations "
@@ -248,6 +261,18 @@ def _flown_side_by_side(
     for seed, found in flown_in_batches(policy, missions, settings, batch, swarm_of):
         every = {name: found.get(name) for name in measured}
         yield MissionScore(seed, mission_value(SimpleNamespace(**every)), every)
+
+
+def batched(planner: Any, task: Task) -> BatchedPolicy | None:
+    """What a planner offers to fly missions of a level side by side; None: one by one.
+
+    Raises:
+        InputError: Unknown planner.
+    """
+    if isinstance(planner, str) and planner != RANDOM:
+        planner = PlannerSpec.named(planner, planner).load()
+    offered = getattr(planner, "in_batch", None)
+    return offered if offered is not None and offered.version == task.version else None
 
 
 class RandomPolicy(PolicyFunction):

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
 
+from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.scenario import Family, MissionSource, Scenario
 from uas_coverage_env.scenario.levels import with_disturbances
 
@@ -34,7 +35,7 @@ class Task:
     """One level. What is on is part of it: none of it can be said otherwise.
 
     Attributes:
-        level: Its name, lower case.
+        level: Its name, lower case, without its version.
         meaning: What it is, in a sentence.
         families: Each mission is of one of them; all are equally likely.
         return_mode: Whether the world brings UAS home in time.
@@ -44,6 +45,9 @@ class Task:
         disturbances: Level of wind and wrong models; None: still air.
         faults: What goes wrong in a mission: (rng, scenario) -> the scenario with its events.
         reward_weights: Weights that are not the default ones.
+        version: Of its environments. Missions are the same in all of them.
+        lesson: Names of what is easier than on the level, to learn on; empty: nothing is.
+        easier: What makes its missions so: from a mission of the level to one of the lesson.
     """
 
     level: str
@@ -56,11 +60,20 @@ class Task:
     disturbances: str | None = None
     faults: Callable[[Rng, Scenario], Scenario] | None = None
     reward_weights: Mapping[str, float] = field(default_factory=dict)
+    version: Version = V0
+    lesson: str = ""
+    easier: tuple[Callable[[Scenario], Scenario], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its name: `hard`, or with version and lesson `hard-v1:landing`."""
+        name = level_name(self.level, self.version.name)
+        return f"{name}:{self.lesson}" if self.lesson else name
 
     @property
     def id(self) -> str:
         """Under which Gymnasium knows it."""
-        return gymnasium_id(self.level)
+        return f"UASCoverage/{self.level.capitalize()}-{self.version.name}"
 
     def scenario(self, seed: int) -> Scenario:
         """The mission of a seed; the same each time."""
@@ -74,9 +87,10 @@ class Task:
             n: How many; None: all.
 
         Raises:
-            ValueError: There is no such split, or it has fewer missions.
+            ValueError: There is no such split, or it has fewer missions; or that of the tests is
+                asked of a lesson.
         """
-        seeds = seeds_of(split)
+        seeds = self._seeds_of(split)
         if n is not None and not 1 <= n <= len(seeds):
             raise ValueError(f"missions is {n}; give 1 to {len(seeds)}")
         return {seed: self.scenario(seed) for seed in seeds[:n]}
@@ -85,17 +99,22 @@ class Task:
         """What environments draw their missions from.
 
         Raises:
-            ValueError: There is no such split.
+            ValueError: There is no such split, or that of the tests is asked of a lesson.
         """
         return MissionSource(
-            _Draw(self, seeds_of(split)),
+            _Draw(self, self._seeds_of(split)),
             n_uas=max(family.size.n_uas[1] for family in self.families),
             n_waypoints=max(family.size.n_waypoints[1] for family in self.families),
             n_moving=max(family.n_moving for family in self.families),
         )
 
+    def _seeds_of(self, split: str) -> range:
+        if self.lesson and split == "test":
+            raise ValueError(f"{self.name} is a lesson, to learn on; it has no test missions")
+        return seeds_of(split)
+
     def settings(self, **chosen: Any) -> dict[str, Any]:
-        """Keyword arguments of an environment.
+        """Keyword arguments of an environment; with `version`, unless it is the first.
 
         Args:
             **chosen: What a learner may choose (`LEARNERS_CHOICE`).
@@ -118,6 +137,8 @@ class Task:
         }
         if "reward" not in chosen:
             given["reward_weights"] = dict(self.reward_weights)
+        if self.version is not V0:
+            given["version"] = self.version
         return {**given, **chosen}
 
 
@@ -132,9 +153,9 @@ class _Draw:
         return self.task.scenario(int(rng.integers(self.seeds.start, self.seeds.stop)))
 
 
-def gymnasium_id(level: str) -> str:
-    """Under which Gymnasium knows a level."""
-    return f"UASCoverage/{level.capitalize()}-v0"
+def level_name(level: str, version: str) -> str:
+    """The name of a level in a version: that of the first goes without it."""
+    return level if version == V0.name else f"{level}-{version}"
 
 
 def seeds_of(split: str) -> range:
@@ -154,7 +175,9 @@ def _mission_of(level: "_ByIdentity", seed: int) -> Scenario:
     rng = np.random.default_rng(seed)
     family = task.families[int(rng.integers(len(task.families)))]
     scenario = with_disturbances(family(rng), task.disturbances, seed)
-    return scenario if task.faults is None else task.faults(rng, scenario)
+    if task.faults is not None:
+        scenario = task.faults(rng, scenario)
+    return reduce(lambda mission, easier: easier(mission), task.easier, scenario)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Assistants, AssistedOptions
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.refusal import refuse_what_asks
+from uas_coverage_env.tasks.in_batch import BatchedPolicy
 from uas_coverage_env.world import Command, SwarmState
 
 
@@ -39,6 +40,9 @@ RUNNERS = {
 """Interface of a policy -> entry point of its runner, `PolicyRunner(policy, assistants)`; loaded
 where it flies, since runners import this package."""
 
+_IN_NUMPY = {"actor": "uas_coverage_agents.policy.environment:ActorRunner"}
+"""The same for those kinds of network that need nothing else, whatever their interface."""
+
 
 def runner_of(policy: Policy, assistants: Assistants, *, trust: bool = False) -> PolicyRunner:
     """The runner that flies a policy.
@@ -52,9 +56,9 @@ def runner_of(policy: Policy, assistants: Assistants, *, trust: bool = False) ->
         InputError: What it needs is not installed.
         ValueError: The policy cannot be flown; says why.
     """
-    interface = policy.description.interface
+    interface, kind = policy.description.interface, policy.description.network.kind
     try:
-        runner = EntryPoint(interface, RUNNERS[interface], "").load()
+        runner = EntryPoint(interface, _IN_NUMPY.get(kind) or RUNNERS[interface], "").load()
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("uas_coverage"):
             raise  # ours is always there
@@ -62,7 +66,7 @@ def runner_of(policy: Policy, assistants: Assistants, *, trust: bool = False) ->
             f"it flies by the library that trained it, and {error.name} is not installed: "
             f"python -m pip install 'uas-coverage-env[learn]'"
         ) from error
-    more = {"trust": trust} if interface == "environment" else {}
+    more = {"trust": trust} if kind == "library" else {}
     return runner(policy, assistants, **more)
 
 
@@ -107,6 +111,11 @@ class PolicyPlanner:
     def fingerprint(self) -> str:
         """What the flights depend on beside the options: the checksum of the weights."""
         return self.policy.description.weights_sha256
+
+    @property
+    def in_batch(self) -> BatchedPolicy | None:
+        """The same for many UAS or swarms at once; None: it flies one mission at a time."""
+        return getattr(self._runner, "in_batch", None)
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what needs compiling."""

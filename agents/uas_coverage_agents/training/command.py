@@ -62,7 +62,7 @@ def train(
         ),
     ] = "0",
     steps: Annotated[
-        int | None, typer.Option(min=1, help="Steps to learn from: total_timesteps.")
+        int | None, typer.Option(min=1, help="Flown steps to learn from: total_timesteps.")
     ] = None,
     change: Annotated[
         list[str] | None,
@@ -221,8 +221,9 @@ def _shown(screen: Console, rounds: int) -> Iterator[Callable[["TrainingProgress
         point, job = progress.point, progress.job
         which = f"seed {job.seed}, " if len(done) > 1 else ""
         return (
-            f"{which}round {progress.rounds} of {job.settings.rounds}: {progress.steps:,} steps; "
-            f"covers {point.coverage:.1%}, all home {point.all_home:.0%}, "
+            f"{which}round {progress.rounds} of {job.settings.rounds}: "
+            f"{progress.steps:,} flown steps; covers {point.coverage:.1%}, "
+            f"all home {point.all_home:.0%}, "
             f"{point.energy_Wh:.1f} Wh in {point.flight_steps:.0f} steps"
         )
 
@@ -260,7 +261,7 @@ def _report(screen: Console, policies: Mapping[Path, "Policy"]) -> None:
                 table.add_row(name, f"{measure.mean:.3f}", interval)
             screen.print(table)
         screen.print(
-            f"{training.steps} steps, {training.process_s:.0f} s of processor time, "
+            f"{training.steps} flown steps, {training.process_s:.0f} s of processor time, "
             f"{training.wall_s:.0f} s; fly it with --planner policy:{place / 'policy'}",
             markup=False,
         )

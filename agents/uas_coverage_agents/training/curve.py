@@ -23,8 +23,8 @@ Seconds = Annotated[float, Field(ge=0.0)]
 class CurvePoint(StrictModel):
     """How the policy flew the validation missions at one moment of its training; means.
 
-    The return is that of the environments' default reward, whatever is learned from; None where a
-    version flew it that did not keep it.
+    Steps are flown steps: decisions that were learned from. The return is that of the environments'
+    default reward, whatever is learned from; None where a version flew it that did not keep it.
     """
 
     steps: Annotated[int, Field(ge=0)]

@@ -92,7 +92,7 @@ class Learner(Protocol):
 
     @property
     def steps(self) -> int:
-        """Learned from so far."""
+        """Flown steps learned from so far: decisions of a UAS, or of the swarm as one agent."""
         ...
 
     def learn(self, number: int, told: Told) -> None:

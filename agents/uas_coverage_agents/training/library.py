@@ -11,22 +11,20 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.logger import KVWriter, Logger
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.policy.description import Observation
+from uas_coverage_agents.policy.environment import observed
 from uas_coverage_agents.policy.library import Library
 from uas_coverage_agents.training.central_critic import CentralCriticPolicy
 from uas_coverage_agents.training.learner import Arrays, Learned, Told
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.model_arrays import learned, take_over
-from uas_coverage_agents.training.settings import LearnerSettings, named_objects
+from uas_coverage_agents.training.rollouts import FlownSteps, flown_buffer_of
+from uas_coverage_agents.training.settings import LearnerSettings, named_objects, takes
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
 from uas_coverage_env.env import CoverageSwarmEnv, full_state
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.env.observation.scales import SCALES
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.plugins.users_code import described
 from uas_coverage_env.scenario import MissionSource
-
-LAYOUT = "uas_coverage_v0"
 
 
 class LibraryLearner:
@@ -51,7 +49,7 @@ class LibraryLearner:
 
     @property
     def steps(self) -> int:
-        """Learned from, of all agents together."""
+        """Flown steps learned from: decisions of all agents together."""
         return int(self.model.num_timesteps)
 
     def learn(self, number: int, told: Told) -> None:
@@ -62,7 +60,10 @@ class LibraryLearner:
         if wanted > 0:
             if hasattr(model, "set_logger"):
                 model.set_logger(Logger(None, [_Writer(told)]))
-            model.learn(wanted, reset_num_timesteps=False)
+            # of UAS that fly, steps count, and those that wait do not
+            counts = isinstance(self.env, CoverageVecEnv) and takes(model.learn, "callback")
+            more = {"callback": FlownSteps()} if counts else {}
+            model.learn(wanted, reset_num_timesteps=False, **more)
         self.env.close()
 
     def state_dict(self) -> Arrays:
@@ -111,11 +112,6 @@ def env_of(
     return make_vec_env(lambda: CoverageSwarmEnv(source, **keywords), num_envs)
 
 
-def observed(keywords: Mapping[str, Any]) -> Observation:
-    """What a policy of these environments reads of one UAS."""
-    return Observation.of(LAYOUT, MissionSettings.of(keywords).observation, SCALES)
-
-
 def model_of(
     settings: LearnerSettings,
     algorithm: Any,
@@ -148,6 +144,10 @@ def model_of(
         policy = CentralCriticPolicy
         seen = flatdim(env.observation_space) - sum(block.size for block in full_state(*room))
         given["policy_kwargs"] = {**given.get("policy_kwargs", {}), "actor_size": seen}
+    if isinstance(env, CoverageVecEnv) and takes(algorithm.__init__, "rollout_buffer_class"):
+        masked = takes(algorithm.predict, "action_masks")
+        own = flown_buffer_of(env.observation_space, masked)
+        given = {"rollout_buffer_class": own, **given}
     try:
         with warnings.catch_warnings():
             # of mini-batches that do not divide a rollout, also where nothing is to be learned

@@ -7,6 +7,7 @@ from typing import Any
 from uas_coverage_agents.policy.description import ScenarioFamily, Towns
 from uas_coverage_agents.training.settings import Environment, LearnerSettings
 from uas_coverage_env.env.episode.settings import MissionSettings
+from uas_coverage_env.env.versions import version_named
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.leaderboard import PlannerSpec
 from uas_coverage_env.leaderboard.scenario_sets import scenario_hash
@@ -15,7 +16,7 @@ from uas_coverage_env.scenario import Family, MissionSource, Scenario
 from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.scenario.families.family import FamilyOfSeeds
 from uas_coverage_env.scenario.families.generated import GeneratedScenarios
-from uas_coverage_env.tasks import LEVELS
+from uas_coverage_env.tasks.levels import level_named, level_names
 from uas_coverage_env.tasks.scoring import entry_of
 from uas_coverage_env.tasks.task import SPLITS, Task
 
@@ -31,7 +32,7 @@ class Missions:
 
     Attributes:
         name: As it was asked for.
-        origin: A level, a family, or the only scenario.
+        origin: A level or a lesson of one, a family, or the only scenario.
         environment: What the learner chooses of its environments.
     """
 
@@ -46,7 +47,8 @@ class Missions:
         Raises:
             InputError: There is no such level, family or scenario, or it has no such choice.
         """
-        name, origin = settings.scenario, LEVELS.get(settings.scenario)
+        name: str = settings.scenario
+        origin = _level(name) if name.partition(":")[0] in level_names() else None
         families = installed_families()
         if origin is None and name in families:
             made = cls(name, _sized(families[name], settings.size), settings.environment)
@@ -74,9 +76,12 @@ class Missions:
             **more: Instead of those that the learner has chosen.
         """
         chosen = {k: v for k, v in self.environment.model_dump().items() if v is not None} | more
+        version = version_named(chosen.pop("version")) if "version" in chosen else None
         if isinstance(self.origin, Task):
-            return self.origin.settings(**chosen)
-        return {"return_mode": True, "safety_filter": True, **chosen}
+            task = self.origin if version is None else replace(self.origin, version=version)
+            return task.settings(**chosen)
+        asked = {} if version is None else {"version": version}
+        return {"return_mode": True, "safety_filter": True, **asked, **chosen}
 
     def mission(self, number: int) -> Scenario:
         """A mission to learn from, for learners that draw none themselves."""
@@ -132,6 +137,13 @@ class Missions:
             names = ("n_uas", "n_waypoints", "n_obstacles")
             towns = Towns(first_seed=_TOWNS, **dict(zip(names, ranges, strict=True)))
         return ScenarioFamily(name=self.name, towns=towns)
+
+
+def _level(name: str) -> Task:
+    try:
+        return level_named(name)
+    except ValueError as error:
+        raise InputError(f"scenario {name!r}: {error}") from error
 
 
 def _sized(family: Family | FamilyOfSeeds, size: Mapping[Any, Any]) -> Family | FamilyOfSeeds:

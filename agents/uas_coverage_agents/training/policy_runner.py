@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
 
 from uas_coverage_agents.policy import Policy
 from uas_coverage_agents.policy.library import Library
@@ -21,6 +22,7 @@ from uas_coverage_env.flight import Assistants, as_planner
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import MissionSource, load_scenario
 from uas_coverage_env.scenario.room import Room
+from uas_coverage_env.tasks.in_batch import BatchedPolicy
 from uas_coverage_env.world import Command, SwarmState
 
 
@@ -57,12 +59,21 @@ class EnvironmentRunner:
         self._memories: dict[str, Any] = {}
         self._asked: Iterator[str] = iter(())
         self._each = settings.agent == "each"
-        self._planner = as_planner(
-            self._action,
-            swarm_of=None if self._each else room.n_uas,
-            **{**keywords, "mask_in_observation": self._masked},
-        )
+        self._swarm_of = None if self._each else room.n_uas
+        self._keywords = {**keywords, "mask_in_observation": self._masked}
+        self._planner = as_planner(self._action, swarm_of=self._swarm_of, **self._keywords)
         self.assistants = self._planner.assistants
+
+    @property
+    def in_batch(self) -> BatchedPolicy | None:
+        """The same for many rows, where it is a library's class that remembers nothing."""
+        remembers = hasattr(getattr(self.model, "policy", None), "lstm_actor")
+        if not isinstance(self.model, BaseAlgorithm) or remembers:
+            return None
+        version = MissionSettings.of(self._keywords).version
+        names = ("action", "observation", "mask_in_observation", "images_apart")
+        chosen = {name: self._keywords[name] for name in names if name in self._keywords}
+        return BatchedPolicy(self._actions, self._swarm_of, version, chosen)
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what it sees and does."""
@@ -92,6 +103,14 @@ class EnvironmentRunner:
             **more,
         )
         return action
+
+    def _actions(self, seen: Any) -> Any:
+        """Of many rows."""
+        more = {}
+        if self._masked:
+            more["action_masks"] = seen["action_mask"]
+            seen = seen["observation"]
+        return self.model.predict(seen, deterministic=True, **more)[0]
 
 
 def _model(

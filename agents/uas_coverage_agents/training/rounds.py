@@ -103,7 +103,7 @@ class TrainingProgress:
     Attributes:
         job: Which.
         rounds: Done.
-        steps: Learned from.
+        steps: Flown steps learned from.
         point: The latest of the learning curve.
     """
 

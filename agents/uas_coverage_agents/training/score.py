@@ -158,7 +158,7 @@ def point_of(
 
     Args:
         results: (missions, measures).
-        steps: Learned from.
+        steps: Flown steps learned from.
         process_s: Processor time of learning [s].
         wall_s: [s].
     """

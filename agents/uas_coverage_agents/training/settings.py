@@ -2,7 +2,7 @@
 
 import inspect
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -53,9 +53,11 @@ class Environment(StrictModel):
     """What a learner chooses of its environments, by their own names.
 
     What is None is as the level says; elsewhere it is the environment's default, but for the
-    assistants, which are on.
+    assistants, which are on. `version` is that of the environments, v0 or v1: missions are the same
+    in both.
     """
 
+    version: Annotated[str, Field(pattern="^v[0-9]+$")] | None = None
     action: str | None = None
     observation: str = "default"
     reward_weights: dict[str, float] | None = None
@@ -76,10 +78,11 @@ class LearnerSettings(StrictModel):
         agent: "swarm": one agent flies the whole fleet. "each": one agent per UAS, all of which
             share the weights.
         critic: "own": the critic sees what the policy sees. "full": the whole mission.
-        scenario: A level, a family, or a scenario; `--scenario` says another one.
+        scenario: A level, with or without lessons (`hard`, `hard:landing`), a family, or a
+            scenario; `--scenario` says another one.
         size: Of the missions of a family: `n_uas`, `n_waypoints`, `n_obstacles`, least and most.
         num_envs: Missions flown at the same time.
-        total_timesteps: Learned from, of all agents together.
+        total_timesteps: Flown steps to learn from: decisions of all agents together.
         rounds: How many; each ends with a checkpoint and begins with new missions.
         environment: What it chooses of its environments.
         learning: Arguments of the class, by its own names; else the library's defaults. A text
@@ -170,17 +173,18 @@ def _set(data: dict[str, Any], change: str) -> None:
     data[last] = value
 
 
-def own_settings(settings: LearnerSettings, model: type[M]) -> M:
+def own_settings(settings: LearnerSettings, model: type[M], reads: Collection[str] = ()) -> M:
     """The table `[learning]` of a learner that has settings of its own.
 
     Args:
         settings: Of the training.
         model: What the table may hold.
+        reads: Further keys that the learner reads.
 
     Raises:
         InputError: There is something else in it, or a key that this learner does not read.
     """
-    for name in settings.model_fields_set - _OF_ALL:
+    for name in settings.model_fields_set - _OF_ALL - set(reads):
         raise InputError(f"{name} = {getattr(settings, name)!r}: {settings.algorithm} reads none")
     return parse(settings.learning, model, "[learning]")
 

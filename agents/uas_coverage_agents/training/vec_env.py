@@ -36,11 +36,12 @@ class CoverageVecEnv(VecEnv):
         `terminal_observation` and, as `Monitor` would write it, `episode` (return, length, time).
 
         A UAS that has ended before its mission waits: its reward is 0, its observation stays, its
-        actions have no effect, and `alive` is False. A mission begins anew in the step in which it
-        ends; then `dones` is True for the waiting ones, too, so that nothing is carried over from
-        the mission before, but there is no `episode` to count. The same holds for UAS that the
-        scenario of a mission does not have, where scenarios of different fleets are mixed; their
-        observation is zero.
+        actions have no effect, and `alive` is False before a step, `flew` after it. A mission
+        begins anew in the step in which it ends; then `dones` is True for the waiting ones, too, so
+        that nothing is carried over from the mission before, but there is no `episode` to count.
+        The same holds for UAS that the scenario of a mission does not have, where scenarios of
+        different fleets are mixed; their observation is zero. `training.rollouts` keeps all of
+        these rows from learners, and from the count of steps.
 
     Seeds:
         `seed(s)` seeds the draw of scenarios of mission m with s + m, at the next reset; the
@@ -87,6 +88,7 @@ class CoverageVecEnv(VecEnv):
         shape = (self.num_missions, self.n_uas)
         self._returns = np.zeros(shape)
         self._lengths = np.zeros(shape, dtype=np.int64)
+        self._flew = np.zeros(shape, dtype=np.bool_)
         self._actions: NDArray[Any] = np.zeros(0)
         self._begun_s = time.perf_counter()
         self._attributes: dict[str, list[Any]] = {}
@@ -104,7 +106,12 @@ class CoverageVecEnv(VecEnv):
     @property
     def alive(self) -> NDArray[np.bool_]:
         """(num_envs,) where the UAS is flying, and so acts in the coming step."""
-        return self.batch.flying.reshape(-1)
+        return self.batch.deciding.reshape(-1)
+
+    @property
+    def flew(self) -> NDArray[np.bool_]:
+        """(num_envs,) where the UAS flew in the latest step: rows that hold a decision."""
+        return self._flew.reshape(-1)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed the draw of scenarios at the next reset; None: with a number of no meaning."""
@@ -138,8 +145,9 @@ class CoverageVecEnv(VecEnv):
             ValueError: An action is not finite or of a wrong shape; nothing has changed.
         """
         batch = self.batch
-        flew = batch.flying
+        flew = batch.deciding
         observation = batch.step(self._actions.reshape(self.num_missions, -1))
+        self._flew = flew
         self._watch()
         lanes = batch.lanes
         over = (lanes.terminated | lanes.truncated)[:, None]
@@ -198,7 +206,7 @@ class CoverageVecEnv(VecEnv):
         return self._flat(self.batch.observation)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of some lanes: `scenario`, `alive`, one that was set, or a common one.
+        """An attribute of some lanes: `scenario`, `alive`, `flew`, one that was set, or a common.
 
         Raises:
             AttributeError: There is no such attribute.
@@ -208,9 +216,9 @@ class CoverageVecEnv(VecEnv):
             return [self._attributes[attr_name][lane] for lane in lanes]
         if attr_name == "scenario":
             return [self.batch.scenario_of(lane // self.n_uas) for lane in lanes]
-        if attr_name == "alive":
-            alive = self.alive.tolist()
-            return [alive[lane] for lane in lanes]
+        if attr_name in ("alive", "flew"):
+            of_lanes = getattr(self, attr_name).tolist()
+            return [of_lanes[lane] for lane in lanes]
         if attr_name == "render_mode":
             return [self._shows] * len(lanes)
         if attr_name == "action_masks":

@@ -22,7 +22,7 @@ from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
 from uas_coverage_baselines.milp_mpc.silent_uas import SilentUas
-from uas_coverage_baselines.milp_mpc.steering import Steering
+from uas_coverage_baselines.milp_mpc.steering import along_order
 from uas_coverage_baselines.rehearsal import rehearse_once
 from uas_coverage_env.entities.commands import HOME, Mode
 from uas_coverage_env.flight import Decision
@@ -30,6 +30,7 @@ from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.planning.around.handover import away_of
+from uas_coverage_env.planning.following import Following
 from uas_coverage_env.world import Command, SwarmState
 
 _CAREFUL_WITHIN_M = 40.0  # of home a UAS that does not come nearer to it flies slowly
@@ -104,9 +105,9 @@ class MovingHorizon(ABC, Generic[Chosen]):
         refuse_what_asks(brief)
         self.dt_s = brief.dt_s
         stated = brief.conditions is not None
-        self._steering: Steering | None = None
+        self._steering: Following | None = None
         if stated and self.options.in_wind == "guidance":
-            self._steering = Steering(brief, self.options, seed)
+            self._steering = along_order(brief, seed)
         self.last_plan = self.plan = self._backup = None
         self._round_robin = RoundRobin()
         self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)

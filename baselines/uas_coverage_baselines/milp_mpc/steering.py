@@ -1,46 +1,41 @@
-"""What the planners in real time fly in a stated wind: their order, under the world's guidance.
+"""What the planners in real time fly in a stated wind: an order, under the world's guidance.
 
 A plan is a sequence of wrenches, computed in still air; in a wind each step ends elsewhere, and the
 limits of the vehicle are exceeded. The inner loop knows what pushes the UAS, and guidance flies by
-it. The order is the one of `order=search`, searched on at every decision.
+it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.options import MovingHorizonOptions
-from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
-from uas_coverage_baselines.milp_mpc.route_guide import RouteGuide, TourShape
-from uas_coverage_env.mission import MissionBrief, first_sight
-from uas_coverage_env.planning.following import Following
-from uas_coverage_env.world import Command, SwarmState
+from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.planning.following import Following, SearchedOrder, Seen
+from uas_coverage_env.planning.following.searched_order import SearchedAgain
+from uas_coverage_env.planning.reserves import ORDER_GUIDE
+from uas_coverage_env.planning.routing import RoutingProblem, SearchEffort, empty_routes
+from uas_coverage_env.planning.routing.legs import Legs
+
+_MOVES = 1_000_000
+_AGAIN_S = 10.0  # so often the order is searched anew: flights take as long as they take
 
 
-class Steering:
-    """Sends each UAS along its route by the world's guidance; no program is solved.
+def along_order(brief: MissionBrief, seed: int) -> Following:
+    """Each UAS along its route by the world's guidance; no program is solved.
 
     Args:
-        brief: the mission.
-        options: of the planner.
-        seed: of the first search.
+        brief: The mission.
+        seed: Of the searches.
     """
+    legs = Legs(brief)
 
-    def __init__(self, brief: MissionBrief, options: MovingHorizonOptions, seed: int) -> None:
-        builder = ProblemBuilder(brief, options)
-        self._guide = RouteGuide(brief, builder, TourShape())
-        self._guide.begin(first_sight(brief), seed)
-        self._following = Following(brief, calls_home=False)
+    def problem(seen: Seen, visited: NDArray[np.bool_]) -> RoutingProblem:
+        swarm = replace(seen.swarm, uncovered=visited)
+        return RoutingProblem.seen(brief, swarm, legs, seen.works, ORDER_GUIDE)
 
-    def commands(self, swarm: SwarmState) -> Mapping[str, Command]:
-        """A command for each UAS that flies and takes commands."""
-        seen = self._following.update(swarm)
-        self._guide.update(replace(swarm, uncovered=seen.wanted))
-        ahead = dict(zip(swarm.active, self._guide.tours(swarm.active), strict=True))
-        targets = {name: int(route[0]) for name, route in ahead.items() if len(route)}
-        blocked = np.zeros(len(swarm.uncovered), np.bool_)
-        blocked[list(self._guide.blocked)] = True
-        return self._following.towards(replace(seen, blocked=blocked), targets)
+    again = SearchedAgain(SearchEffort(_MOVES), max(round(_AGAIN_S / brief.dt_s), 1), seed)
+    order = SearchedOrder(problem, empty_routes(len(brief.uas)), again)
+    return Following(brief, order, calls_home=False)

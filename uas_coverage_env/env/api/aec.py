@@ -87,7 +87,7 @@ def raw_env(
     Args:
         scenario: See `CoverageParallelEnv`; likewise the others.
         render_mode: None, "rgb_array" or "human".
-        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.
@@ -122,7 +122,7 @@ def env(
     Args:
         scenario: See `CoverageParallelEnv`; likewise the others.
         render_mode: None, "rgb_array" or "human".
-        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.

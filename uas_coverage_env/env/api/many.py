@@ -1,6 +1,6 @@
 """The short way to many missions at once, on the processor or on a GPU."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
@@ -87,13 +87,26 @@ def vector_env(
         ImportError: "cuda", and numba-cuda is not installed.
         RuntimeError: "cuda", and there is no GPU.
     """
-    both: dict[str, Any] = {
-        "autoreset_mode": autoreset_mode, "threads": threads, "render_mode": render_mode, **settings
+    given: dict[str, Any] = {
+        "autoreset_mode": autoreset_mode, "threads": threads, "render_mode": render_mode,
+        "copy": copy, **settings,
     }  # fmt: skip
+    return many_of(CoverageVectorEnv, num_envs, scenario, device, given)
+
+
+def many_of(
+    kind: type[CoverageVectorEnv],
+    num_envs: int,
+    scenario: ScenarioLike | Sequence[str | Path | Scenario],
+    device: str,
+    given: Mapping[str, Any],
+) -> "CoverageVectorEnv | CudaMissions":
+    """Many missions at once, of the version of a class; see `vector_env`."""
     if device == "cuda":
         from uas_coverage_env.env.gpu.missions import CudaMissions
 
-        return CudaMissions(num_envs, scenario, **both)
+        there = {name: value for name, value in given.items() if name != "copy"}
+        return CudaMissions(num_envs, scenario, version=kind.version, **there)
     if device != "cpu":
         raise ValueError(f"device is {device!r}; it is one of cpu, cuda")
-    return CoverageVectorEnv(num_envs, scenario, copy=copy, **both)
+    return kind(num_envs, scenario, **given)

@@ -105,7 +105,7 @@ class CoverageParallelEnv(Versioned, ParallelEnv[str, NDArray[np.float32], Any])
         scenario: Name of a shipped scenario, path of a scenario file, a `Scenario` or its plain
             data. To draw a scenario at each reset: the name of a family (`generated`), a
             `MissionSource`, or any function `generator(rng) -> Scenario`.
-        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.
@@ -129,6 +129,9 @@ class CoverageParallelEnv(Versioned, ParallelEnv[str, NDArray[np.float32], Any])
 
     Version History:
         v0: First version. After 0.3.0, wrenches beyond the vehicle's limits have a price.
+
+        v1: Ways past obstacles are observed, velocities are fine near rest, waypoints can be passed
+        over, and what is left open has a price (docs/versions.md).
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # pyrefly: ignore[bad-override]

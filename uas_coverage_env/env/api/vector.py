@@ -95,7 +95,7 @@ class CoverageVectorEnv(Versioned, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         render_mode: None; "rgb_array": `render` returns a tuple of pictures, 512 x 512 pixels each,
             as Gymnasium's wrappers ask for; "rgb_array_tiled": one array (H, W, 3) that shows the
             first 16 missions side by side; "human": a window with these (extra `human`).
-        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.

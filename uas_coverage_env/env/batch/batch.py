@@ -45,7 +45,7 @@ from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.pay import paying_of
 from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, takes_settings
 from uas_coverage_env.env.episode.step import ACCEPTED, Rules
-from uas_coverage_env.env.versions import V0, Version
+from uas_coverage_env.env.versions import V0, Version, version_named
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
@@ -75,8 +75,8 @@ class CoverageBatch:
         autoreset: A name of `AUTORESET`.
         threads: How many of numba's threads share the lanes, `NUMBA_NUM_THREADS` at most. They wait
             for work by spinning: on a busy machine set `OMP_WAIT_POLICY=passive`.
-        version: Of the environments.
-        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        version: Of the environments, or its name.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.
@@ -116,7 +116,7 @@ class CoverageBatch:
         *,
         autoreset: str = "next_step",
         threads: int = 1,
-        version: Version = V0,
+        version: Version | str = V0,
         **settings: Unpack[MissionKeywords],
     ) -> None:
         _check_count("num_envs", num_envs, _MOST_LANES)
@@ -124,7 +124,7 @@ class CoverageBatch:
             _check_count("threads", threads, numba.get_num_threads())
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset is {autoreset!r}; it is one of {', '.join(AUTORESET)}")
-        self.settings = MissionSettings.of(settings, version)
+        self.settings = MissionSettings.of(settings, version_named(version))
         self.num_envs = int(num_envs)
         self.pool = pool_of(scenario, self.settings, self.num_envs)
         self.n_uas = self.pool.sizes["U"]
@@ -136,7 +136,7 @@ class CoverageBatch:
         shape = (self.num_envs, self.n_uas, self.settings.observation_size)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
         self._threads = int(threads)
-        self._observing = observing_of(self.settings.observation, version.observation)
+        self._observing = observing_of(self.settings.observation, self.settings.version.observation)
         # else kernels do, which neither draw nor change scenes
         self._begins_here = self.pool.draws or (self.pool.changes and self.autoreset == SAME_STEP)
         self._begun = False
@@ -171,6 +171,12 @@ class CoverageBatch:
     def flying(self) -> NDArray[np.bool_]:
         """(L, U) which UAS fly now, an array of its own."""
         return self.worlds.uas["status"] == FLYING
+
+    @property
+    def deciding(self) -> NDArray[np.bool_]:
+        """(L, U) which UAS decide in the coming step: they fly, in a mission that goes on."""
+        ended = self.lanes.terminated | self.lanes.truncated
+        return self.flying & ((self.autoreset == SAME_STEP) | ~ended)[:, None]
 
     def action_masks(self) -> NDArray[np.bool_]:
         """(L, U, choices) the choices that exist now."""

@@ -14,6 +14,7 @@ from uas_coverage_env.env.observation.nearest import N_AROUND, NEIGHBOURS_DTYPE,
 from uas_coverage_env.env.observation.notes import NOTES_DTYPE
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS, SCALES_DTYPE
 from uas_coverage_env.env.report import REPORT_SIZE
+from uas_coverage_env.env.rewards.potentials import N_POTENTIALS
 from uas_coverage_env.world.arena import ARENA
 
 LOWEST, MIDDLE, HIGHEST = range(3)
@@ -61,6 +62,8 @@ class Learners(NamedTuple):
     """What is open around each waypoint, see `write_around`."""
     notes: Annotated[NDArray[np.void], NOTES_DTYPE, "U"]
     """What blocks of the observation have in common, see `ObservationBlock.needs`."""
+    potentials: Annotated[NDArray[np.float64], "U", N_POTENTIALS]
+    """Of the step before, where the reward has them, see `env.rewards.potentials`."""
     report: Annotated[NDArray[np.int64], "U", REPORT_SIZE]
     """Of the latest step, see `env.report`."""
     amounts: Annotated[NDArray[np.float64], "U", "P"]

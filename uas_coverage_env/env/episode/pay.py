@@ -52,23 +52,30 @@ def paying_of(terms: Sequence[RewardTerm], weights: NDArray[np.float64], own: Te
 
 
 def _paid(terms: Terms, term: int, first: int) -> Any:
-    """One kernel that writes the values of terms in turn, from a column and a parameter on."""
+    """One kernel that writes the values of terms in turn, from a column and a parameter on.
+
+    Those that are off by default are computed only where they have a weight.
+    """
     if not terms:
 
         @inlined_kernel
-        def pay_nothing(arena, state, tables, learners, scratch, parameters, i):
+        def pay_nothing(arena, state, tables, learners, scratch, paying, i):
             pass
 
         return pay_nothing
     value, n = terms[0].value, len(terms[0].parameters)
     rest = _paid(terms[1:], term + 1, first + n)
+    may_be_off = terms[0].weight == 0.0
 
     @inlined_kernel
-    def pay_both(arena, state, tables, learners, scratch, parameters, i):
-        learners.amounts[i, FIRST_TERM + term] = value(
-            arena, state, tables, learners, scratch, i, slice_view(parameters, first, n)
-        )
-        rest(arena, state, tables, learners, scratch, parameters, i)
+    def pay_both(arena, state, tables, learners, scratch, paying, i):
+        if may_be_off and paying.weights[term] == 0.0:
+            learners.amounts[i, FIRST_TERM + term] = 0.0
+        else:
+            learners.amounts[i, FIRST_TERM + term] = value(
+                arena, state, tables, learners, scratch, i, slice_view(paying.parameters, first, n)
+            )
+        rest(arena, state, tables, learners, scratch, paying, i)
 
     return pay_both
 
@@ -90,12 +97,12 @@ def compute_rewards_with(own: Terms, *, calls: bool = True) -> Any:
 
     @inlined_kernel
     def pay_own(arena, state, tables, learners, scratch, paying, i):
-        pay(arena, state, tables, learners, scratch, paying.parameters, i)
+        pay(arena, state, tables, learners, scratch, paying, i)
 
     @inlined_kernel
     def pay_all(arena, state, tables, learners, scratch, paying, i):
         if paying.begins_as_version[0]:
-            pay(arena, state, tables, learners, scratch, paying.parameters, i)
+            pay(arena, state, tables, learners, scratch, paying, i)
         if rarely(paying.calls.shape[0] > 0):
             for t in range(paying.calls.shape[0]):
                 call = paying.calls[t]

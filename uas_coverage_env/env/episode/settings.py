@@ -13,7 +13,7 @@ from uas_coverage_env.env.actions import ActionKind
 from uas_coverage_env.env.observation import ObservationBlock
 from uas_coverage_env.env.rewards import RewardTerm
 from uas_coverage_env.env.rewards.term import weights_of
-from uas_coverage_env.env.versions import V0, Version
+from uas_coverage_env.env.versions import V0, Version, version_named
 from uas_coverage_env.features.feature import MissionFeature, checked_features
 from uas_coverage_env.files.blocks import checked_blocks
 from uas_coverage_env.scenario import Scenario
@@ -64,7 +64,7 @@ class MissionSettings:
     """What the environments take as keyword arguments, whatever their interface.
 
     Attributes:
-        action: "velocity", "acceleration", "wrench" or "waypoint"; or an `ActionKind`.
+        action: "velocity", "acceleration", "wrench", "waypoint" (v1: "planar"); or an `ActionKind`.
         dynamics: "lpv", or "nonlinear": six degrees of freedom, powertrain, exact power.
         return_mode: The world flies a UAS home in time, whatever its actions.
         safety_filter: The world replaces commands after which a UAS could not brake in time.
@@ -83,7 +83,7 @@ class MissionSettings:
             that `Box`.
         flat_infos: Infos have `reward_terms_home` and so on instead of sub-dictionaries. For
             libraries that make an array of every info (TorchRL). None: as in the version.
-        version: Which version of the environments this is.
+        version: Which version of the environments this is, or its name (`v1`).
 
     Raises:
         ValueError: A value is none of what is allowed; says what is.
@@ -104,7 +104,8 @@ class MissionSettings:
     version: Version = V0
 
     def __post_init__(self) -> None:
-        version = self.version
+        version = version_named(self.version)
+        object.__setattr__(self, "version", version)
         version.kind_of(self.action)
         if self.dynamics not in get_args(DynamicsName):
             allowed = ", ".join(get_args(DynamicsName))
@@ -142,19 +143,26 @@ class MissionSettings:
 
     @classmethod
     def of(
-        cls, given: Mapping[str, Any], version: Version = V0, beside: Sequence[str] = ()
+        cls, given: Mapping[str, Any], version: Version | None = None, beside: Sequence[str] = ()
     ) -> "MissionSettings":
         """The settings of keyword arguments.
 
         Args:
-            given: Name -> value, see `MissionKeywords`.
-            version: Of the environment.
+            given: Name -> value, see `MissionKeywords`; and `version`, of settings of a level.
+            version: Of the environment; None: as given, or the first.
             beside: Other keyword arguments of the function that takes them, for its error.
 
         Raises:
             ValueError: There is no such setting, or a value is none of what is allowed.
         """
         known = tuple(MissionKeywords.__annotations__)
+        given = dict(given)
+        told = version_named(given.pop("version", version or V0))
+        if version is not None and told is not version:
+            raise ValueError(
+                f"version is {told.name}, and the environment's is {version.name}; take that of "
+                f"uas_coverage_{told.name}"
+            )
         for name in given:
             if name not in known:
                 taken = ", ".join((*beside, *known))
@@ -162,7 +170,7 @@ class MissionSettings:
                     f"unexpected keyword argument {name!r}; there are {taken}"
                 )
         inside = {inside_name(name): value for name, value in given.items()}
-        return cls(**inside, version=version)
+        return cls(**inside, version=told)
 
     @property
     def weights(self) -> NDArray[np.float64]:

@@ -13,9 +13,13 @@ from uas_coverage_env.env.observation.own import OWN
 from uas_coverage_env.env.observation.remaining import REMAINING
 from uas_coverage_env.env.observation.surroundings import SURROUNDINGS
 from uas_coverage_env.env.observation.waypoints import WAYPOINTS
+from uas_coverage_env.env.observation.ways import WAYS
 
 OBSERVATION = (OWN, HOME, REMAINING, SURROUNDINGS, WAYPOINTS, OTHERS, MOVING_OBSTACLES)
-"""The blocks of an observation of this version, in their order."""
+"""The blocks of an observation of `uas_coverage_v0`, in their order."""
+
+OBSERVATION_V1 = (*OBSERVATION, WAYS)
+"""Those of `uas_coverage_v1`: the same, and behind them the ways to the waypoints."""
 
 OBSERVATION_SIZE = sum(block.size for block in OBSERVATION)
 """Numbers in the observation of one UAS, the same in every scenario."""

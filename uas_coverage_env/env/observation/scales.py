@@ -67,6 +67,8 @@ SCALES_DTYPE = record_dtype(
         ("per_half_side", "f8", (3,)),
         # one over the heaviest weight
         ("per_heaviest", "f8"),
+        # depth of discharge that it starts with
+        ("start_dod", "f8"),
     ]
 )
 """What one UAS's numbers are divided by."""
@@ -95,4 +97,5 @@ def scales_of(scenario: Scenario) -> NDArray[np.void]:
         scale["centre_m"] = (low_m + high_m) / 2
         scale["per_half_side"] = 2 / (high_m - low_m)
         scale["per_heaviest"] = 1 / max(weights)
+        scale["start_dod"] = 1 - uas.soc_0
     return scales

@@ -179,7 +179,9 @@ class MissionInterface:
             their sum.
         """
         if self._world is not None and self._world.revisions != self._revisions:
+            before = self._learners.potentials
             self._lay_out()
+            self._learners.potentials[:] = before
         self._scratch.commands[:] = commands
         self._scratch.outcome[:] = outcome
         self._pay(
@@ -200,5 +202,5 @@ def _command(row: np.void) -> Command:
     if kind == WRENCH:
         return Wrench(*values, mode=mode)
     if kind == GO_TO:
-        return GoTo(None if values[0] == HOME else int(values[0]), mode)
+        return GoTo(None if values[0] == HOME else int(values[0]), mode, values[1])
     raise ValueError("the kind of action writes CLIMB, which no planner can command")

@@ -45,7 +45,7 @@ def violation(arena, state, tables, learners, scratch, i, parameters):
 @inlined_kernel
 def home(arena, state, tables, learners, scratch, i, parameters):
     """What share of all weight is covered when it lands."""
-    return _covered_share(arena, state) if scratch.outcome[i].landed else 0.0
+    return covered_share(arena, state) if scratch.outcome[i].landed else 0.0
 
 
 @inlined_kernel
@@ -71,7 +71,8 @@ def time(arena, state, tables, learners, scratch, i, parameters):
 
 
 @rare_kernel
-def _covered_share(arena, state):
+def covered_share(arena, state):
+    """What share of all weight is covered."""
     total = 0.0
     covered = 0.0
     for w in range(state.uncovered.shape[0]):

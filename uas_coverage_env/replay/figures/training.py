@@ -40,7 +40,7 @@ _PANELS = (
 
 
 def training_figure(runs: Mapping[str, Curve]) -> Figure:
-    """Coverage, violations, energy and duration over the steps learned from, a line per training.
+    """Coverage, violations, energy and duration over the flown steps, a line per training.
 
     The return is shown, too, where all tables have it. A table of one row is that of a planner that
     does not learn: a level line.
@@ -77,10 +77,10 @@ def training_figure(runs: Mapping[str, Curve]) -> Figure:
         for axis in grid[1]:
             axis.set_ylim(bottom=0)
         for axis in (grid[-1, 0], grid[1, 1]):
-            axis.set_xlabel(f"Steps learned from, {unit_name}")
+            axis.set_xlabel(f"Flown steps learned from, {unit_name}")
             axis.tick_params(labelbottom=True)
         if rows == 2:
-            grid[1, 0].set_xlabel(f"Steps learned from, {unit_name}")
+            grid[1, 0].set_xlabel(f"Flown steps learned from, {unit_name}")
         figure.align_ylabels()
         if any(runs):
             handles, labels = grid[0, 0].get_legend_handles_labels()

@@ -1,0 +1,282 @@
+"""A network that acts for each UAS of a fleet: layers, and one scorer for all candidates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, JsonValue, model_validator
+
+from uas_coverage_agents.policy.tensors import Tensors, Width
+from uas_coverage_env.env.observation.block import Group
+from uas_coverage_env.env.observation.scales import NEARBY_M
+from uas_coverage_env.files.strict_toml import StrictModel
+
+SHARPENED = ("energy_margin", "below")
+"""Features of which small values matter: they are read a second time, times `GAIN`."""
+
+GAIN = 6.0
+REACHES_M = (10.0, 60.0)
+FAR_M = 200.0
+"""Distances are read up to here [m]."""
+
+OF_WAYPOINTS = ("waypoints", "ways")
+"""Blocks of which each row is about a waypoint, in the same order."""
+
+_Column = Annotated[int, Field(ge=0, le=100_000)]
+_Columns = Annotated[tuple[_Column, ...], Field(max_length=10_000)]
+_Vectors = Annotated[tuple[tuple[_Column, _Column, _Column], ...], Field(max_length=1000)]
+_EACH = "candidates."
+_STANDARD = "offset", "scale"
+
+
+class Candidates(StrictModel):
+    """What is read of each candidate, by columns of the observation; a row for each.
+
+    Attributes:
+        columns: Read as they are.
+        sharp: Read times `GAIN`, within ±1.
+        vectors: Direction (north, east) and closeness: read as distance, and as the share of its
+            speed with which the UAS flies there.
+        width: Of the scorer.
+    """
+
+    columns: Annotated[tuple[_Columns, ...], Field(min_length=1, max_length=1000)]
+    sharp: Annotated[tuple[_Columns, ...], Field(max_length=1000)]
+    vectors: _Vectors
+    width: Width
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        rows = {len(self.columns), len(self.sharp), len(self.vectors)}
+        if len(rows) > 1 or len({*map(len, self.columns)}) > 1 or len({*map(len, self.sharp)}) > 1:
+            raise ValueError("candidates: give columns, sharp and vectors a row for each of them")
+        return self
+
+    @property
+    def inputs(self) -> int:
+        """Numbers that are read of each."""
+        return len(self.columns[0]) + len(self.sharp[0]) + 2
+
+
+class Actor(StrictModel):
+    """Layers with tanh over features of the observation; then a score for each choice, or actions.
+
+    Candidates are scored by one scorer, which sees one of them and the last layer (pointer
+    network: Vinyals, Fortunato, Jaitly 2015); all other outputs are linear in the last layer and
+    the features. Whatever it reads is standardised by what was seen at first in its training.
+
+    Attributes:
+        kind: "actor".
+        inputs: Numbers of the observation of one UAS.
+        columns: Of these, those that are read as they are.
+        sharp: Those that are read times `GAIN`, within ±1, too.
+        vectors: Direction (north, east) and closeness, which are read as vectors, too: each
+            shortened to `REACHES_M`, and in units of it.
+        velocity: Where its velocity north and east is.
+        hidden: Widths of the layers.
+        candidates: What there is to choose from; None: actions are no choices.
+        others: Outputs after the candidates.
+        temperature: Choices are drawn with probabilities exp(score / this), as they were while it
+            was learned; 0: the best one is taken. UAS that see the same and never draw collide.
+        nearby_m: Closeness is 1/(1 + distance / nearby_m) [m].
+        environment: Keyword arguments of the environments that it flies in.
+    """
+
+    kind: Literal["actor"] = "actor"
+    inputs: Width
+    columns: _Columns
+    sharp: _Columns
+    vectors: _Vectors
+    velocity: tuple[_Column, _Column]
+    hidden: Annotated[tuple[Width, ...], Field(min_length=1, max_length=8)]
+    candidates: Candidates | None = None
+    others: Width
+    temperature: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    nearby_m: Annotated[float, Field(gt=0.0)]
+    environment: dict[str, JsonValue]
+
+    @model_validator(mode="after")
+    def _reads_what_is_there(self) -> Self:
+        each = self.candidates
+        rows = [*self.vectors, self.columns, self.sharp, self.velocity]
+        rows += [*each.columns, *each.sharp, *each.vectors] if each else []
+        last = max((column for row in rows for column in row), default=0)
+        if last >= self.inputs:
+            raise ValueError(f"column {last} is read, and there are {self.inputs}")
+        return self
+
+    @classmethod
+    def of(
+        cls,
+        blocks: Sequence[Group],
+        choices: int,
+        outputs: int,
+        *,
+        hidden: tuple[int, ...],
+        width: int,
+        rows: int,
+        temperature: float,
+        environment: dict[str, Any],
+    ) -> "Actor":
+        """The network for an observation.
+
+        Args:
+            blocks: What it is to read.
+            choices: How many of the outputs are candidates, in the order of the waypoints in the
+                observation; 0: none.
+            outputs: How many there are.
+            hidden: See `Actor`.
+            width: Of the scorer.
+            rows: How many waypoints the layers see.
+            temperature: See `Actor`.
+            environment: See `Actor`.
+        """
+        table = _columns_of(blocks)
+        of_all, of_each = _Read(), [_Read() for _ in range(choices)]
+        for name, rows_of in table.items():
+            for row in rows_of[:rows] if name in OF_WAYPOINTS else rows_of:
+                of_all.add(row)
+            if name in OF_WAYPOINTS and len(rows_of) >= choices:
+                for read, row in zip(of_each, rows_of, strict=False):
+                    read.add(row)
+        north, east, *_ = table["own"][0]["velocity"]
+        each = None
+        if choices:
+            each = Candidates(
+                columns=tuple(tuple(one.columns) for one in of_each),
+                sharp=tuple(tuple(one.sharp) for one in of_each),
+                vectors=tuple(one.vectors[-1] for one in of_each),
+                width=width,
+            )
+        return cls(
+            inputs=sum(block.size for block in blocks),
+            columns=tuple(of_all.columns),
+            sharp=tuple(of_all.sharp),
+            vectors=tuple(of_all.vectors),
+            velocity=(north, east),
+            hidden=hidden,
+            candidates=each,
+            others=outputs - choices,
+            temperature=temperature,
+            nearby_m=NEARBY_M,
+            environment=environment,
+        )
+
+    @property
+    def outputs(self) -> int:
+        """Numbers that it gives."""
+        return self.others + (len(self.candidates.columns) if self.candidates else 0)
+
+    @property
+    def features(self) -> int:
+        """Numbers that the layers read."""
+        return len(self.columns) + len(self.sharp) + 2 * len(REACHES_M) * len(self.vectors)
+
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Name -> shape of every tensor."""
+        last = self.hidden[-1]
+        shapes: dict[str, tuple[int, ...]] = {name: (self.features,) for name in _STANDARD}
+        for k, (below, above) in enumerate(pairwise((self.features, *self.hidden))):
+            shapes[f"layers.{k}.weight"] = (above, below)
+            shapes[f"layers.{k}.bias"] = (above,)
+        shapes |= {"others.weight": (self.others, last + self.features)}
+        shapes |= {"others.bias": (self.others,)}
+        if each := self.candidates:
+            parts = {
+                **{name: (each.inputs,) for name in _STANDARD},
+                "one.weight": (each.width, each.inputs), "one.bias": (each.width,),
+                "all.weight": (each.width, last), "score.weight": (1, each.width),
+            }  # fmt: skip
+            shapes |= {_EACH + name: shape for name, shape in parts.items()}
+        return shapes
+
+    def read(self, inputs: NDArray[np.floating]) -> NDArray[Any]:
+        """What the layers read: (..., inputs) -> (..., features)."""
+        parts = [inputs[..., self.columns], np.clip(GAIN * inputs[..., self.sharp], -1.0, 1.0)]
+        if self.vectors:
+            north, east, closeness = np.array(self.vectors).T
+            distance_m = self._distance(inputs[..., closeness])
+            for reach_m in REACHES_M:
+                share = np.minimum(distance_m, reach_m) / reach_m
+                parts += [share * inputs[..., north], share * inputs[..., east]]
+        return np.concatenate(parts, axis=-1)
+
+    def read_of_each(self, inputs: NDArray[np.floating]) -> NDArray[Any]:
+        """What the scorer reads: (..., inputs) -> (..., candidates, their inputs)."""
+        each = self.candidates
+        assert each is not None
+        north, east, closeness = np.array(each.vectors).T
+        north_speed, east_speed = (inputs[..., [column]] for column in self.velocity)
+        there = inputs[..., north] * north_speed + inputs[..., east] * east_speed
+        parts = [
+            inputs[..., np.array(each.columns)],
+            np.clip(GAIN * inputs[..., np.array(each.sharp)], -1.0, 1.0),
+            (self._distance(inputs[..., closeness]) / FAR_M)[..., np.newaxis],
+            there[..., np.newaxis],
+        ]
+        return np.concatenate(parts, axis=-1)
+
+    def forward(self, tensors: Tensors, inputs: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Run it.
+
+        Args:
+            tensors: Those of `shapes`.
+            inputs: (..., inputs).
+
+        Returns:
+            (..., candidates + others).
+        """
+        inputs = np.asarray(inputs, dtype=np.float64)
+        x = seen = (self.read(inputs) - tensors["offset"]) * tensors["scale"]
+        for k in range(len(self.hidden)):
+            x = np.tanh(x @ tensors[f"layers.{k}.weight"].T + tensors[f"layers.{k}.bias"])
+        whole = np.concatenate([x, seen], axis=-1)
+        others = whole @ tensors["others.weight"].T + tensors["others.bias"]
+        if self.candidates is None:
+            return others
+        of = {name.removeprefix(_EACH): t for name, t in tensors.items() if name.startswith(_EACH)}
+        one = (self.read_of_each(inputs) - of["offset"]) * of["scale"]
+        both = one @ of["one.weight"].T + of["one.bias"] + (x @ of["all.weight"].T)[..., None, :]
+        scores = np.tanh(both) @ of["score.weight"][0]
+        return np.concatenate([scores, others], axis=-1)
+
+    def _distance(self, closeness: NDArray[np.floating]) -> NDArray[Any]:
+        nearest = self.nearby_m / (self.nearby_m + FAR_M)
+        return self.nearby_m / np.maximum(closeness, nearest) - self.nearby_m
+
+
+_Row = dict[str, tuple[int, ...]]
+
+
+def _columns_of(blocks: Sequence[Group]) -> dict[str, list[_Row]]:
+    """Block -> for each of its rows, feature -> columns."""
+    found: dict[str, list[_Row]] = {}
+    column = 0
+    for block in blocks:
+        found[block.name] = []
+        for _ in range(block.repeats):
+            row = {}
+            for feature in block.features:
+                row[feature.name] = tuple(range(column, column + feature.size))
+                column += feature.size
+            found[block.name].append(row)
+    return found
+
+
+@dataclass
+class _Read:
+    """Columns that are read, as in `Actor`."""
+
+    columns: list[int] = field(default_factory=list)
+    sharp: list[int] = field(default_factory=list)
+    vectors: list[Any] = field(default_factory=list)
+
+    def add(self, row: _Row) -> None:
+        """Read a row of a block."""
+        self.columns += [column for columns in row.values() for column in columns]
+        self.sharp += [column for name in SHARPENED for column in row.get(name, ())]
+        if "direction" in row:
+            self.vectors.append((*row["direction"], *(row.get("leg") or row["closeness"])))

@@ -1,0 +1,111 @@
+"""The network `policy.actor.Actor` in torch, to be learned; values have layers of their own."""
+
+from itertools import pairwise
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from uas_coverage_agents.policy.actor import Actor
+from uas_coverage_agents.training.learner import Arrays
+
+_LEAST_SPREAD = 0.05
+"""What varies less in the first rows is scaled as if it varied so much."""
+
+_AT_FIRST = 0.1
+"""The last layers begin with weights of this share: all choices are much alike."""
+
+
+class ActorCritic(nn.Module):
+    """What is learned.
+
+    Args:
+        network: What it is in NumPy.
+    """
+
+    offset: Tensor
+    scale: Tensor
+    each_offset: Tensor
+    each_scale: Tensor
+
+    def __init__(self, network: Actor) -> None:
+        super().__init__()
+        self.network, last = network, network.hidden[-1]
+        self.layers, self.judge = (_layers(network.features, network.hidden) for _ in range(2))
+        self.others = nn.Linear(last + network.features, network.others)
+        self.value = nn.Linear(last, 1)
+        small: list[nn.Linear] = [self.others, self.value]
+        self.register_buffer("offset", torch.zeros(network.features))
+        self.register_buffer("scale", torch.ones(network.features))
+        if each := network.candidates:
+            self.one = nn.Linear(each.inputs, each.width)
+            self.all = nn.Linear(last, each.width, bias=False)
+            self.score = nn.Linear(each.width, 1, bias=False)
+            small.append(self.score)
+            self.register_buffer("each_offset", torch.zeros(each.inputs))
+            self.register_buffer("each_scale", torch.ones(each.inputs))
+        with torch.no_grad():
+            for layer in small:
+                layer.weight.mul_(_AT_FIRST)
+                if layer.bias is not None:
+                    layer.bias.zero_()
+
+    def read(self, observed: NDArray[np.float32]) -> tuple[Tensor, Tensor | None]:
+        """What a forward pass reads of the observations of some rows."""
+        read, each = self.network.read(observed).astype(np.float32), None
+        if self.network.candidates is not None:
+            each = torch.from_numpy(self.network.read_of_each(observed).astype(np.float32))
+        return torch.from_numpy(read), each
+
+    def standardise(self, read: Tensor, each: Tensor | None, exists: Tensor | None) -> None:
+        """Take the means and spreads of some rows as the ones to expect.
+
+        Args:
+            read: (N, features).
+            each: (N, candidates, their inputs); None: there are none.
+            exists: (N, candidates) which of them are there.
+        """
+        _standardise(read, self.offset, self.scale)
+        if each is not None:
+            _standardise(each[exists], self.each_offset, self.each_scale)
+
+    def outputs(self, read: Tensor, each: Tensor | None) -> Tensor:
+        """(N, outputs), as `Actor.forward`."""
+        seen = (read - self.offset) * self.scale
+        x = self.layers(seen)
+        others = self.others(torch.cat([x, seen], 1))
+        if each is None:
+            return others
+        one = self.one((each - self.each_offset) * self.each_scale)
+        scores = self.score(torch.tanh(one + self.all(x)[:, None]))[:, :, 0]
+        return torch.cat([scores, others], 1)
+
+    def values(self, read: Tensor) -> Tensor:
+        """(N,) what the critic expects."""
+        return self.value(self.judge((read - self.offset) * self.scale))[:, 0]
+
+    def tensors(self) -> Arrays:
+        """Those of `Actor.shapes`."""
+        own = {name: tensor.detach().numpy() for name, tensor in self.state_dict().items()}
+        names = {"offset": "offset", "scale": "scale"}
+        names |= {f"others.{part}": f"others.{part}" for part in ("weight", "bias")}
+        for k in range(len(self.network.hidden)):
+            names |= {f"layers.{k}.{p}": f"layers.{2 * k}.{p}" for p in ("weight", "bias")}
+        if self.network.candidates is not None:
+            parts = "one.weight", "one.bias", "all.weight", "score.weight"
+            names |= {f"candidates.{part}": part for part in parts}
+            names |= {f"candidates.{part}": f"each_{part}" for part in ("offset", "scale")}
+        return {name: own[found] for name, found in names.items()}
+
+
+def _layers(inputs: int, hidden: tuple[int, ...]) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for below, above in pairwise((inputs, *hidden)):
+        layers += [nn.Linear(below, above), nn.Tanh()]
+    return nn.Sequential(*layers)
+
+
+def _standardise(rows: Tensor, offset: Tensor, scale: Tensor) -> None:
+    offset.copy_(rows.mean(0))
+    scale.copy_(1.0 / rows.std(0).clamp(min=_LEAST_SPREAD))

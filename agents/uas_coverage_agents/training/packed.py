@@ -1,0 +1,417 @@
+"""PPO with shared weights, from decisions alone: `uas-coverage train ppo-waypoint`, `ppo-velocity`.
+
+Schulman et al. 2017 as it is usually done, on the batch of environments itself. What is its own:
+
+- *Packed samples.* Rows of a batch in which no UAS decides, since it has landed, is lost, or is not
+  in the fleet, are not learned from; they are up to 70 % of all.
+- *Phases.* Weights of the reward, learning rate, entropy and noise change with the steps, see
+  `Phase`. A loss that costs much from the first step on teaches to land at once.
+- *Noise by a schedule* where actions are numbers: no landing is found with more than a tenth of the
+  top speed, and a spread that is learned stays above it.
+- *The time limit is an end*, since the time that is left is observed.
+"""
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, NamedTuple, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+from torch import Tensor, nn
+
+from uas_coverage_agents.policy.actor import Actor
+from uas_coverage_agents.policy.environment import observed, plain
+from uas_coverage_agents.training.actor import ActorCritic
+from uas_coverage_agents.training.learner import SEEDS_APART, Arrays, Learned, Told
+from uas_coverage_agents.training.missions import Missions
+from uas_coverage_agents.training.settings import Count, LearnerSettings, own_settings
+from uas_coverage_agents.training.torch_state import Modules
+from uas_coverage_env.entities.state import FLYING, LANDED
+from uas_coverage_env.env import K_WAYPOINTS, CoverageBatch, MissionSettings
+from uas_coverage_env.env.report import STATUS
+from uas_coverage_env.files.strict_toml import InputError, StrictModel
+from uas_coverage_env.scenario import Scenario
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+_READ = {"num_envs", "total_timesteps", "environment"}
+_MOMENTS = ("exp_avg", "exp_avg_sq", "step")
+
+
+class Phase(StrictModel):
+    """What holds from some step on; a round has the phase in which it begins.
+
+    Attributes:
+        begins: At how many steps.
+        reward_weights: Instead of those of the environment.
+        learning_rate: Of Adam.
+        ent_coef: Weight of the entropy of the choices.
+        noise: Standard deviation of actions that are numbers, at its begin and its end; between
+            them it falls exponentially.
+        lesson: Fields of the scenarios that are other than in the missions, such as
+            `landing_distance_m`.
+    """
+
+    begins: Annotated[int, Field(ge=0)] = 0
+    reward_weights: dict[str, float] = Field(default_factory=dict)
+    learning_rate: Positive = 7e-4
+    ent_coef: NotNegative = 0.0
+    noise: tuple[Positive, Positive] = (0.4, 0.4)
+    lesson: dict[str, float] = Field(default_factory=dict)
+
+
+class PackedSettings(StrictModel):
+    """The table `[learning]`; names are those of Stable-Baselines3 where it has one.
+
+    Attributes:
+        n_steps: Of each environment, before the weights are changed.
+        batch_size: Decisions that are learned from at once.
+        n_epochs: How often each is learned from.
+        gamma: Discount of a step.
+        gae_lambda: Of generalised advantage estimation.
+        clip_range: Of the ratio of probabilities.
+        vf_coef: Weight of the error of values.
+        max_grad_norm: Gradients are shortened to it.
+        target_kl: No further epoch where the policy has moved so far.
+        reward_scale: What is learned is this times the reward.
+        hidden: Widths of the layers, of policy and of values.
+        width: Of the scorer of candidates; 0: there is none, choices are outputs like others.
+        rows: How many of the nearest waypoints the layers see.
+        temperature: At which the policy draws its choices in flight: 1 as while it learns, 0 the
+            best one.
+        missions: Of a round, from which the environments draw.
+        phases: In order of their begin; the first begins at 0.
+    """
+
+    n_steps: Count = 64
+    batch_size: Count = 4096
+    n_epochs: Count = 2
+    gamma: Share = 0.998
+    gae_lambda: Share = 0.97
+    clip_range: Positive = 0.2
+    vf_coef: NotNegative = 0.5
+    max_grad_norm: Positive = 0.5
+    target_kl: Positive = 0.04
+    reward_scale: Positive = 0.2
+    hidden: Annotated[tuple[Count, ...], Field(min_length=1, max_length=8)] = (96, 64)
+    width: Annotated[int, Field(ge=0, le=4096)] = 32
+    rows: Count = 6
+    temperature: NotNegative = 0.5
+    missions: Count = 128
+    phases: Annotated[tuple[Phase, ...], Field(min_length=1)] = (Phase(),)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        begins = [phase.begins for phase in self.phases]
+        if begins[0] != 0 or sorted(set(begins)) != begins:
+            raise ValueError(f"phases: they begin at {begins}; give 0 first, then rising numbers")
+        return self
+
+
+class PackedPpo:
+    """See `Learner`.
+
+    Args:
+        settings: Of the training; `[learning]` is `PackedSettings`.
+        missions: Where it learns.
+        seed: Of network, sampling and missions.
+
+    Raises:
+        InputError: A setting is not for this learner.
+    """
+
+    def __init__(self, settings: LearnerSettings, missions: Missions, seed: int) -> None:
+        torch.manual_seed(seed)
+        self._settings, self._missions, self._seed = settings, missions, seed
+        self._own = own_settings(settings, PackedSettings, _READ)
+        self._keywords, self._steps = missions.settings(), 0
+        for phase in self._own.phases:
+            self._check(phase)
+        rules = MissionSettings.of(self._keywords)
+        self._network = Actor.of(
+            rules.observation,
+            K_WAYPOINTS if rules.chooses and self._own.width else 0,
+            rules.kind.choices or rules.kind.size,
+            hidden=self._own.hidden,
+            width=self._own.width,
+            rows=self._own.rows,
+            temperature=self._own.temperature if rules.chooses else 0.0,
+            environment=plain(self._keywords),
+        )
+        self._model = ActorCritic(self._network)
+        self._optimiser = torch.optim.Adam(self._model.parameters(), eps=1e-5)
+        self._modules = Modules(model=self._model)
+
+    @property
+    def steps(self) -> int:
+        """Decisions that were learned from."""
+        return self._steps
+
+    def learn(self, number: int, told: Told) -> None:
+        """As many steps as are a round's share of the whole, in new missions."""
+        settings = self._settings
+        wanted = settings.total_timesteps * (number + 1) // settings.rounds
+        if self._steps >= wanted:
+            return
+        begins = [phase.begins for phase in self._own.phases]
+        phase = self._own.phases[bisect_right(begins, self._steps) - 1]
+        flown = _Flown(self._batch(phase, number), self._own)
+        while self._steps < wanted:
+            noise = self._noise(phase)
+            rows = flown.collect(self._model, noise)
+            if self._steps == 0:
+                # what was seen at first is what is expected from then on
+                with torch.no_grad():
+                    self._model.standardise(rows.read, rows.each, rows.exists)
+            self._steps += len(rows.read)
+            kl = self._learn_from(rows, phase, noise)
+            told.add(self._steps, kl=kl, noise=noise, **flown.tell())
+
+    def state_dict(self) -> Arrays:
+        """Weights, the moments of Adam, and the steps."""
+        arrays = {**self._modules.state_dict(), "steps": np.array(self._steps)}
+        for k, kept in self._optimiser.state_dict()["state"].items():
+            arrays |= {f"adam/{k}/{name}": kept[name].numpy().copy() for name in _MOMENTS}
+        return arrays
+
+    def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """See `Learner`."""
+        self._modules.load_state_dict(state)
+        kept = self._optimiser.state_dict()
+        shapes = [parameter.shape for parameter in self._model.parameters()]
+        try:
+            self._steps = int(state["steps"])
+            if self._steps:
+                for k, shape in enumerate(shapes):
+                    moments = {n: torch.from_numpy(state[f"adam/{k}/{n}"].copy()) for n in _MOMENTS}
+                    if any(moments[name].shape != shape for name in _MOMENTS[:2]):
+                        raise ValueError(f"adam/{k}: other shapes")
+                    kept["state"][k] = moments
+            self._optimiser.load_state_dict(kept)
+        except (KeyError, ValueError, TypeError, RuntimeError) as error:
+            raise InputError(f"the checkpoint does not fit this learner ({error})") from error
+
+    def learned(self) -> Learned:
+        """The policy; it flies without torch."""
+        return Learned(
+            "environment", self._network, observed(self._keywords), self._model.tensors()
+        )
+
+    def _check(self, phase: Phase) -> None:
+        if strange := phase.lesson.keys() - Scenario.model_fields.keys():
+            raise InputError(f"[learning] phases: lesson: a scenario has no {min(strange)!r}")
+        try:
+            MissionSettings.of(self._paid(phase))
+        except ValueError as error:
+            raise InputError(f"[learning] phases: {error}") from error
+
+    def _paid(self, phase: Phase) -> dict[str, Any]:
+        """Keyword arguments of the environments in a phase."""
+        weights = {**(self._keywords.get("reward_weights") or {}), **phase.reward_weights}
+        return {**self._keywords, "reward_weights": weights}
+
+    def _batch(self, phase: Phase, number: int) -> CoverageBatch:
+        """New missions for a round."""
+        first = (self._seed // SEEDS_APART * self._settings.rounds + number) * self._own.missions
+        drawn = [self._missions.mission(first + k) for k in range(self._own.missions)]
+        taught = [
+            each.model_copy(update=phase.lesson)
+            for each in {id(one): one for one in drawn}.values()
+        ]
+        batch = CoverageBatch(
+            self._settings.num_envs, taught, autoreset="same_step", **self._paid(phase)
+        )
+        batch.reset(self._seed * self._settings.num_envs)
+        return batch
+
+    def _noise(self, phase: Phase) -> float:
+        """Of actions that are numbers, now."""
+        later = [p.begins for p in self._own.phases if p.begins > phase.begins]
+        end = later[0] if later else self._settings.total_timesteps
+        share = min(max((self._steps - phase.begins) / max(end - phase.begins, 1), 0.0), 1.0)
+        return float(phase.noise[0] ** (1.0 - share) * phase.noise[1] ** share)
+
+    def _learn_from(self, rows: "Rows", phase: Phase, noise: float) -> float:
+        """Change the weights; gives how far the policy has moved (KL divergence)."""
+        own, kl = self._own, 0.0
+        for group in self._optimiser.param_groups:
+            group["lr"] = phase.learning_rate
+        advantages = (rows.advantages - rows.advantages.mean()) / (rows.advantages.std() + 1e-6)
+        for _ in range(own.n_epochs):
+            moved = []
+            for some in torch.randperm(len(advantages)).split(own.batch_size):
+                each = None if rows.each is None else rows.each[some]
+                exists = None if rows.masks is None else rows.masks[some]
+                outputs = self._model.outputs(rows.read[some], each)
+                likely, entropy = _likely(outputs, rows.actions[some], exists, noise)
+                apart = likely - rows.likely[some]
+                ratio, better = apart.exp(), advantages[some]
+                within = ratio.clamp(1.0 - own.clip_range, 1.0 + own.clip_range)
+                errors = self._model.values(rows.read[some]) - rows.returns[some]
+                loss = (
+                    -torch.min(ratio * better, within * better).mean()
+                    + own.vf_coef * (errors**2).mean()
+                    - phase.ent_coef * entropy
+                )
+                self._optimiser.zero_grad()
+                loss.backward()
+                nn.utils.clip_grad_norm_(self._model.parameters(), own.max_grad_norm)
+                self._optimiser.step()
+                moved.append(float((ratio.detach() - 1.0 - apart.detach()).mean()))
+            kl = float(np.mean(moved))
+            if kl > own.target_kl:
+                break
+        return kl
+
+
+class Rows(NamedTuple):
+    """Decisions, N of them, one after the other: of all steps, missions and UAS."""
+
+    read: Tensor
+    """(N, features)."""
+    each: Tensor | None
+    """(N, candidates, their inputs)."""
+    masks: Tensor | None
+    """(N, choices) which exist."""
+    actions: Tensor
+    """(N,) choices, or (N, numbers) with their noise."""
+    likely: Tensor
+    """(N,) logarithms of their probabilities when they were taken."""
+    advantages: Tensor
+    """(N,)."""
+    returns: Tensor
+    """(N,)."""
+
+    @property
+    def exists(self) -> Tensor | None:
+        """(N, candidates)."""
+        if self.masks is None or self.each is None:
+            return None
+        return self.masks[:, : self.each.shape[1]]
+
+
+class _Flown:
+    """Missions that are flown to learn from them; they go on from one `collect` to the next.
+
+    Args:
+        batch: That has begun.
+        own: How long is flown, and what a reward is worth later.
+    """
+
+    def __init__(self, batch: CoverageBatch, own: PackedSettings) -> None:
+        self._batch, self._own = batch, own
+        self._ended = np.zeros(3)
+
+    def collect(self, model: ActorCritic, noise: float) -> Rows:
+        """Fly on with what is known, with noise; nothing but decisions is kept."""
+        batch, steps = self._batch, self._own.n_steps
+        shape = (steps, batch.num_envs, batch.n_uas)
+        rewards, decided = np.zeros(shape, np.float32), np.zeros(shape, bool)
+        ended, values = decided.copy(), np.zeros((steps + 1, *shape[1:]), np.float32)
+        kept: list[tuple[Any, ...]] = []
+        for t in range(steps):
+            acts = decided[t] = batch.deciding
+            read, each = model.read(batch.observation[acts])
+            masks = torch.from_numpy(batch.action_masks()[acts]) if batch.chooses else None
+            with torch.no_grad():
+                actions, likely = _drawn(model.outputs(read, each), masks, noise)
+                values[t][acts] = model.values(read).numpy()
+            kept.append((read, each, masks, actions, likely))
+            batch.step(_asked(batch, acts, actions))
+            rewards[t] = self._own.reward_scale * batch.lanes.rewards
+            ended[t] = self._end(acts)
+        last = batch.deciding
+        with torch.no_grad():
+            values[steps][last] = model.values(model.read(batch.observation[last])[0]).numpy()
+        own = self._own
+        advantages = advantages_of(rewards, values, ended, own.gamma, own.gae_lambda)
+        read, each, masks, actions, likely = map(_joined, zip(*kept, strict=True))
+        gained = torch.from_numpy(advantages[decided])
+        returns = gained + torch.from_numpy(values[:-1][decided])
+        return Rows(read, each, masks, actions, likely, gained, returns)
+
+    def tell(self) -> dict[str, float]:
+        """Of the UAS whose flights ended since the last time: how, with the noise of learning."""
+        flights, home, share = self._ended
+        self._ended[:] = 0.0
+        there = max(flights, 1.0)
+        return {"flights": flights, "home": home / there, "lost_or_late": share / there}
+
+    def _end(self, acted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(L, U) whose flight this step has ended."""
+        batch = self._batch
+        over = (batch.lanes.terminated | batch.lanes.truncated)[:, None]
+        report = np.where(over[..., None], batch.missions.final.report, batch.learners.report)
+        status = report[:, :, STATUS]
+        ended = acted & (over | (status != FLYING))
+        home = ended & (status == LANDED)
+        self._ended += ended.sum(), home.sum(), (ended & ~home).sum()
+        return ended
+
+
+def advantages_of(
+    rewards: NDArray[np.float32],
+    values: NDArray[np.float32],
+    ended: NDArray[np.bool_],
+    gamma: float,
+    gae_lambda: float,
+) -> NDArray[np.float32]:
+    """Generalised advantages (Schulman et al. 2016); an end is worth nothing beyond its reward.
+
+    Args:
+        rewards: (T, ...).
+        values: (T + 1, ...) what was expected.
+        ended: (T, ...).
+        gamma: Discount.
+        gae_lambda: Of the mean over longer and longer looks.
+
+    Returns:
+        (T, ...).
+    """
+    found, later = np.zeros_like(rewards), np.zeros(rewards.shape[1:], np.float32)
+    for t in range(len(rewards) - 1, -1, -1):
+        goes_on = np.where(ended[t], np.float32(0.0), np.float32(1.0))
+        error = rewards[t] + gamma * goes_on * values[t + 1] - values[t]
+        later = found[t] = error + gamma * gae_lambda * goes_on * later
+    return found
+
+
+def _joined(parts: Sequence[Any]) -> Any:
+    """Of all steps, one after the other; None where there are none."""
+    return None if parts[0] is None else torch.cat(tuple(parts))
+
+
+def _drawn(outputs: Tensor, masks: Tensor | None, noise: float) -> tuple[Tensor, Tensor]:
+    """Actions, and the logarithms of their probabilities."""
+    if masks is None:
+        actions = outputs + noise * torch.randn_like(outputs)
+    else:
+        gumbel = -torch.log(-torch.log(torch.rand_like(outputs).clamp(1e-9, 1.0 - 1e-7)))
+        actions = (_masked(outputs, masks) + gumbel).argmax(1)
+    return actions, _likely(outputs, actions, masks, noise)[0]
+
+
+def _likely(
+    outputs: Tensor, actions: Tensor, masks: Tensor | None, noise: float
+) -> tuple[Tensor, Tensor]:
+    """(N,) logarithms of the probabilities of actions, and the mean entropy of choices."""
+    if masks is None:
+        return (-0.5 * ((actions - outputs) / noise) ** 2).sum(1), torch.zeros(())
+    logarithms = torch.log_softmax(_masked(outputs, masks), 1)
+    entropy = -(logarithms.exp() * logarithms.clamp(min=-30.0)).sum(1).mean()
+    return logarithms.gather(1, actions[:, None])[:, 0], entropy
+
+
+def _masked(outputs: Tensor, masks: Tensor) -> Tensor:
+    return outputs.masked_fill(~masks, -1e9)
+
+
+def _asked(batch: CoverageBatch, acts: NDArray[np.bool_], actions: Tensor) -> NDArray[Any]:
+    """The actions of all lanes; where nothing is decided they have no effect."""
+    asked = np.zeros(batch.learners.asked.shape, np.float32)
+    asked[acts] = actions.reshape(len(actions), -1).numpy()
+    return asked[..., 0].astype(np.int64) if batch.chooses else asked

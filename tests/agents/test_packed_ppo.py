@@ -1,0 +1,270 @@
+"""PPO from decisions alone: what is learned from, what flies, and that it repeats."""
+
+import sys
+
+import numpy as np
+import pytest
+import torch
+from uas_coverage_agents.policy.actor import Actor
+from uas_coverage_agents.policy.environment import ActorRunner, action_of, keywords_of
+from uas_coverage_agents.training import packed
+from uas_coverage_agents.training.learner import Told
+from uas_coverage_agents.training.missions import Missions
+from uas_coverage_agents.training.packed import PackedPpo, advantages_of
+from uas_coverage_agents.training.rounds import TrainingJob, policy_of, train
+from uas_coverage_agents.training.settings import settings_of
+
+from uas_coverage_env import MissionBrief, generate_scenario, load_planner, rollout
+from uas_coverage_env.env import HOME_CHOICE, CoverageBatch
+from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.flight import Assistants
+from uas_coverage_env.mission import first_sight
+
+TINY = (
+    *("num_envs=2", "rounds=2", "total_timesteps=64", "size.n_uas=[2,2]"),
+    *("size.n_waypoints=[5,5]", "size.n_obstacles=[0,2]"),
+    *("learning.n_steps=8", "learning.batch_size=16", "learning.hidden=[8,4]"),
+    *("learning.missions=2",),
+)
+LEARNERS = "ppo-waypoint", "ppo-velocity"
+
+
+def tiny(name="ppo-waypoint", *changes):
+    return settings_of(name, scenario="generated", changes=[*TINY, *changes])
+
+
+def made(settings, seed=0):
+    return PackedPpo(settings, Missions.of(settings), seed)
+
+
+def learned(settings, seed=0, rounds=1):
+    learner = made(settings, seed)
+    for number in range(rounds):
+        learner.learn(number, Told())
+    return learner
+
+
+def policy(learner, settings):
+    return policy_of(TrainingJob("tiny", settings), learner, 0.0, 0.0)
+
+
+def observed(settings, steps=3):
+    """What UAS observe in some steps of missions, with their masks."""
+    missions = Missions.of(settings)
+    batch = CoverageBatch(4, [missions.mission(k) for k in range(2)], **missions.settings())
+    batch.reset(0)
+    for _ in range(steps):
+        batch.step(np.zeros(batch.learners.asked.shape[: 2 if batch.chooses else 3], int))
+    masks = batch.action_masks()[batch.flying] if batch.chooses else None
+    return batch.observation[batch.flying], masks
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_the_same_seed_learns_the_same_weights_and_another_seed_learns_others(name):
+    one, again, other = (learned(tiny(name), seed).state_dict() for seed in (0, 0, 1))
+    assert all(np.array_equal(one[key], again[key]) for key in one)
+    assert not np.array_equal(one["model/others.weight"], other["model/others.weight"])
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_training_that_was_stopped_goes_on_to_the_same_weights(name, tmp_path):
+    job = TrainingJob("tiny", tiny(name), missions=1)
+    whole = train({tmp_path / "whole": job})[tmp_path / "whole"]
+
+    def stop(progress):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train({tmp_path / "stopped": job}, on_progress=stop)
+    resumed = train({tmp_path / "stopped": job})[tmp_path / "stopped"]
+    assert resumed.description.weights_sha256 == whole.description.weights_sha256
+    assert resumed.description.training.steps >= 64
+
+
+def test_what_is_put_aside_is_all_that_is_known():
+    settings = tiny()
+    state = learned(settings).state_dict()
+    again = made(settings, seed=1)
+    again.load_state_dict(state)
+    back = again.state_dict()
+    assert back.keys() == state.keys()
+    assert all(np.array_equal(back[key], state[key]) for key in state)
+    assert any(state[key].any() for key in state if "exp_avg_sq" in key)
+
+
+def test_the_state_of_another_learner_is_refused_in_a_line():
+    state = learned(tiny()).state_dict()
+    for spoilt in (
+        {key: each for key, each in state.items() if "adam/3" not in key},
+        state | {"adam/3/exp_avg": np.zeros(3, np.float32)},
+    ):
+        with pytest.raises(InputError, match="does not fit this learner") as caught:
+            made(tiny()).load_state_dict(spoilt)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="does not fit this learner"):
+        made(tiny("ppo-waypoint", "learning.hidden=[8,5]")).load_state_dict(state)
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_the_saved_policy_gives_what_torch_gives(name, tmp_path):
+    settings = tiny(name)
+    learner = learned(settings)
+    seen, _ = observed(settings)
+    with torch.no_grad():
+        expected = learner._model.outputs(*learner._model.read(seen)).numpy()
+    found = policy(learner, settings).forward(seen)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * max(1, abs(found).max()))
+    assert np.ptp(found, axis=0).max() > 0.0
+
+
+def test_a_masked_choice_is_never_taken_neither_in_flight_nor_with_noise():
+    settings = tiny()
+    learner = learned(settings)
+    seen, masks = observed(settings)
+    masks = masks.copy()
+    best = policy(learner, settings).forward(seen).argmax(axis=1)
+    masks[np.arange(len(seen)), best] = False
+    masks[:, HOME_CHOICE] = True
+    rows = np.arange(len(seen))
+    choice = action_of(policy(learner, settings))
+    assert masks[rows, choice({"observation": seen, "action_mask": masks})].all()
+    with torch.no_grad():
+        outputs = learner._model.outputs(*learner._model.read(seen))
+        for _ in range(50):
+            drawn, likely = packed._drawn(outputs, torch.from_numpy(masks), 1.0)
+            assert masks[rows, drawn.numpy()].all()
+            assert torch.isfinite(likely).all()
+
+
+def test_choices_are_drawn_in_flight_as_the_seed_of_the_mission_says_or_the_best_is_taken():
+    scenario = generate_scenario(900_501, n_uas=2, n_waypoints=8, n_obstacles=0)
+    brief = MissionBrief.of(scenario)
+    swarm = first_sight(brief)
+
+    def chosen(temperature, seed):
+        settings = tiny("ppo-waypoint", f"learning.temperature={temperature}")
+        runner = ActorRunner(policy(made(settings), settings), Assistants())
+        runner.reset(brief, seed)
+        return [runner.act(swarm)["uas_1"] for _ in range(20)]
+
+    assert chosen(100.0, 3) == chosen(100.0, 3) != chosen(100.0, 4)
+    assert len(set(map(str, chosen(100.0, 3)))) > 2
+    assert chosen(0.0, 3) == chosen(0.0, 4)
+
+
+def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
+    settings = tiny("ppo-waypoint", "learning.n_steps=40")
+    learner = made(settings)
+    batch = learner._batch(learner._own.phases[0], 0)
+    flew, step = [], batch.step
+
+    def noted(actions):
+        flew.append(batch.flying)
+        actions[:, 0] = HOME_CHOICE  # lands at once, then waits for the other
+        return step(actions)
+
+    batch.step = noted
+    flown = packed._Flown(batch, learner._own)
+    rows = flown.collect(learner._model, 1.0)
+    flew = np.array(flew)
+    assert len(rows.read) == len(rows.actions) == len(rows.returns) == flew.sum()
+    assert 0 < flew.sum() < flew.size
+    told = flown.tell()
+    assert told["flights"] > 0
+    assert told["home"] == 1.0
+    assert flown.tell()["flights"] == 0
+
+
+def test_a_flight_ends_where_its_time_runs_out():
+    changes = "environment.max_cycles=5", "environment.return_mode=false"
+    learner = made(tiny("ppo-velocity", *changes))
+    flown = packed._Flown(learner._batch(learner._own.phases[0], 0), learner._own)
+    flown.collect(learner._model, 0.01)  # 8 steps of 2 missions of 2 UAS
+    told = flown.tell()
+    assert (told["flights"], told["home"], told["lost_or_late"]) == (4, 0.0, 1.0)
+
+
+def test_advantages_look_ahead_to_an_end_and_not_beyond():
+    rewards = np.array([[1.0], [2.0], [4.0]], np.float32)
+    values = np.array([[0.5], [0.25], [8.0], [3.0]], np.float32)
+    ended = np.array([[False], [True], [False]])
+    found = advantages_of(rewards, values, ended, 0.5, 0.5)[:, 0]
+    last = 4.0 + 0.5 * 3.0 - 8.0
+    second = 2.0 - 0.25
+    first = 1.0 + 0.5 * 0.25 - 0.5 + 0.25 * second
+    assert found.tolist() == [first, second, last]
+
+
+def test_noise_falls_from_the_begin_of_a_phase_to_its_end():
+    phases = "[{noise=[0.4, 0.1]}, {begins=200, noise=[0.1, 0.05]}]"
+    changes = "total_timesteps=400", f"learning.phases={phases}"
+    learner = made(tiny("ppo-velocity", *changes))
+    first, second = learner._own.phases
+    found = []
+    for steps, phase in ((0, first), (100, first), (200, first), (200, second), (400, second)):
+        learner._steps = steps
+        found.append(learner._noise(phase))
+    assert found == pytest.approx([0.4, 0.2, 0.1, 0.1, 0.05])
+
+
+def test_a_phase_pays_by_its_own_weights_in_missions_of_its_lesson():
+    phases = """[
+        {reward_weights={home=1.0}, lesson={landing_distance_m=4.0}},
+        {begins=32, reward_weights={home=7.0}},
+    ]"""
+    learner = made(tiny("ppo-waypoint", f"learning.phases={phases}"))
+    first, second = (learner._batch(phase, 0) for phase in learner._own.phases)
+    at = first.settings.term_names.index("home")
+    assert [first.settings.weights[at], second.settings.weights[at]] == [1.0, 7.0]
+    assert [one.scenario_of(0).landing_distance_m for one in (first, second)] == [4.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("phases=[{begins=5}]", "give 0 first"),
+        ("phases=[{reward_weights={homme=1.0}}]", "homme"),
+        ("phases=[{lesson={tolerance=1.0}}]", "tolerance"),
+        ("gamma=1.5", "gamma"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused_in_a_line(change, words):
+    with pytest.raises(InputError, match=words) as caught:
+        made(tiny("ppo-waypoint", f"learning.{change}"))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_the_policy_flies_without_torch(name, tmp_path, monkeypatch):
+    settings = tiny(name)
+    train({tmp_path: TrainingJob("tiny", settings, missions=1)})
+    for module in [each for each in sys.modules if each.startswith("uas_coverage_agents.training")]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    planner = load_planner(f"policy:{tmp_path / 'policy'}")
+    scenario = generate_scenario(900_501, n_uas=2, n_waypoints=5, n_obstacles=2)
+    assert rollout(scenario, planner, max_steps=5).planner == f"policy:{tmp_path / 'policy'}"
+    assert "uas_coverage_agents.training" not in sys.modules
+
+
+def test_a_file_whose_network_reads_what_is_not_there_is_refused():
+    settings = tiny()
+    network = policy(made(settings), settings).description.network
+    data = network.model_dump()
+    for change in (
+        {"columns": (network.inputs,)},
+        {"velocity": (0, 99_999)},
+        {"vectors": ((0, 1, -1),)},
+        {"candidates": {**data["candidates"], "sharp": data["candidates"]["sharp"][1:]}},
+    ):
+        with pytest.raises(ValueError, match=r"column|greater|row"):
+            Actor.model_validate({**data, **change})
+
+
+def test_a_policy_of_other_outputs_than_its_action_has_is_refused():
+    settings = tiny()
+    found = policy(made(settings), settings)
+    network = found.description.network.model_copy(update={"others": 2})
+    changed = type(found)(found.description.model_copy(update={"network": network}), found.tensors)
+    with pytest.raises(ValueError, match="outputs for action 'waypoint'"):
+        keywords_of(changed)
