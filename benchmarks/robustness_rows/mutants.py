@@ -199,6 +199,7 @@ ROW = Row(
         "comparisons, `and` and `or`, truth values, `break` and `continue`, drop a sign or a "
         "`not`, and add 1 to a number or take it away"
     ),
-    "Other files, and tests that are not named for a file but might see its mutants. On demand: "
+    "Other files, and tests that are not named for a file but might see its mutants. Tests were "
+    "written for survivors of this draw, so that of another one fewer are caught. On demand: "
     "needs the extra `mutants`, and takes hours.",
 )

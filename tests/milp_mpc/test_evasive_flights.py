@@ -54,6 +54,7 @@ def test_a_uas_gets_out_of_the_way_and_brakes():
     assert np.linalg.norm(plan.x[0, -1, VX : VZ + 1]) < 0.1
     assert np.linalg.norm(plan.x[0, -1, :3] - HERE) < 16.0, "no farther than it has to"
     assert not plan.covers.any()
+    assert (plan.objective, plan.bound) == (0.0, -np.inf), "it is no answer of a program"
 
 
 @pytest.mark.parametrize(("dt_s", "steps"), [(0.5, 48), (0.8, 30)])

@@ -81,6 +81,7 @@ def test_a_uas_that_would_be_home_with_less_than_the_reserve_flies_home_and_the_
     assert abs(way_m(followed.plan, 1 - row, 8)) < 0.1
     assert np.linalg.norm(followed.plan.x[:, -1, VX : VZ + 1], axis=1).max() < 0.1
     assert followed.plan.u.shape[1] == 8 + BRAKING
+    assert (followed.plan.objective, followed.plan.bound) == (0.0, -np.inf)
 
 
 def test_a_uas_with_a_new_plan_sees_to_its_way_home_itself():
