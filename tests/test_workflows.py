@@ -58,7 +58,9 @@ def test_every_library_of_the_clients_tests_is_installed_by_a_job():
     named = [f"test_{name}.py" for names in jobs for name in names]
     files = {path.name for path in (ROOT / "tests" / "clients").glob("test_*.py")}
     assert len(named) == len(set(named))
-    assert files - set(named) == {"test_gymnasium_wrappers.py", "test_loops.py"}
+    others = {"test_gymnasium_wrappers.py", "test_loops.py"}
+    no_package = {"test_epymarl.py"}  # flown from a checkout
+    assert files - set(named) == others | no_package
     assert set(named) <= files
     assert " -c constraints.txt " in steps("clients")[0]
 

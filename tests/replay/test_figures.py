@@ -289,7 +289,7 @@ def test_the_steps_of_a_short_training_are_counted_in_thousands(tmp_path):
     for run, last, unit in ((curve, 1.0, "million"), (short, 4.16, "thousand")):
         axes = training_figure({"": run}).axes[-1]
         assert lines(axes)[0][-1, 0] == pytest.approx(last)
-        assert axes.get_xlabel() == f"Steps learned from, {unit}"
+        assert axes.get_xlabel() == f"Flown steps learned from, {unit}"
 
 
 def test_a_training_alone_needs_no_legend(tmp_path):
