@@ -87,10 +87,6 @@ class RouteGuide:
         searches = [(effort, seed + attempt) for attempt in range(_FIRST_SEARCHES)]
         self._order = search_orders(problem, empty_routes(problem.n_uas), searches)[0]
 
-    def take(self, swarm: SwarmState, order: Routes) -> None:
-        """Begin with an order that was searched elsewhere."""
-        self._order = improve_routes(self._problem(swarm), order, self._glance, 0)
-
     def update(self, swarm: SwarmState) -> None:
         """Bring the order up to date with what is seen now."""
         previous = self._order or empty_routes(len(self._names))

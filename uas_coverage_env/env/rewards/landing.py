@@ -1,8 +1,8 @@
-"""What landing is worth: by what the swarm has covered in the end, whoever of it lands first.
+"""What landing is worth: what the swarm has covered in the end, whichever UAS lands first.
 
-A UAS that lands is paid at once for what is covered, and pays for what is open. It is gone then: of
-what is covered after that, who covers it is paid the same once more for each UAS that is home. So
-the sum over the swarm depends on how the mission ends and not on the order in which it comes home.
+A UAS that lands is paid at once for what is covered, and pays for what is open; then its flight is
+over. Who covers a waypoint later is paid that share once more for each UAS that is home. So the sum
+over the swarm depends on how the mission ends, not on the order in which its UAS come home.
 """
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, rare_kernel
