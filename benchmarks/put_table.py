@@ -3,7 +3,8 @@
     python benchmarks/put_table.py sweep         the leaderboard
     python benchmarks/put_table.py sweep test    the same planners on the `test` set
     python benchmarks/put_table.py sweep light   in light wind; likewise moderate, strong,
-                                                 nonlinear (the plant), karhula
+                                                 nonlinear (the plant), karhula, searched (an
+                                                 order for milp-mpc), horizon (its N)
 
 Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (`table.md`
 without what its columns mean, and without single scenarios) and of `README.md` (a short table),
@@ -25,7 +26,7 @@ from uas_coverage_env.files.digits import three_digits
 
 ROOT = Path(__file__).parents[1]
 UNCERTAIN = ("light", "moderate", "strong", "nonlinear")  # where no flight is as the model has it
-MARKS = ("leaderboard", "test", "karhula", *UNCERTAIN)
+MARKS = ("leaderboard", "test", "karhula", "searched", "horizon", *UNCERTAIN)
 COLUMNS_EXPLAINED = "Interquartile means"
 PICTURE = ROOT / "docs" / "pictures" / "leaderboard.png"
 
@@ -58,7 +59,8 @@ def short_table(data: dict[str, Any], mark: str = "leaderboard") -> str:
     columns = dict(_UNCERTAIN if mark in UNCERTAIN else _STILL)
     columns[f"Δ energy to {reference}, %"] = lambda one: _difference(one, reference, "energy")
     columns["Δ steps, %"] = lambda one: _difference(one, reference, "steps")
-    if mark not in UNCERTAIN:
+    bounded = any(one["above_bound_percent"]["value"] is not None for one in data["scores"])
+    if bounded and mark not in UNCERTAIN:
         columns["above the bound, %"] = lambda one: _plain(_estimate(one["above_bound_percent"]))
     lines = [
         "| " + " | ".join(["planner", *columns]) + " |",

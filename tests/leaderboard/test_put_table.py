@@ -69,6 +69,7 @@ def test_the_test_set_has_marks_of_its_own(put_table, tmp_path):
     begin, end = put_table.marks_of("test")
     inside = readme.read_text().split(begin)[1].split(end)[0]
     assert "| `p` | 2/2 | 0 | 1.00 |" in inside
+    assert "bound" not in inside  # nothing has one
     assert readme.read_text().count("old") == len(put_table.MARKS) - 1
     assert other.read_text() == untouched
     assert not (tmp_path / "picture.png").exists()

@@ -5,7 +5,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from toy_problems import BY_NODES, planned
+from toy_problems import BY_NODES, planned, two_around_a_tower
 from uas_coverage_baselines.milp_mpc.search import team_search
 from uas_coverage_baselines.milp_mpc.search.decision import decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
@@ -66,3 +66,24 @@ def test_as_many_uas_are_planned_for_as_the_work_suffices_for(problem, of_one, m
     first, then = (search.planned(turns, []) for _ in range(2))
     assert len(first) == len(then) == many
     assert set(first + then) == {0, 1}, "the other one is next"
+
+
+def test_of_one_uas_the_joint_program_gets_as_many_nodes_as_work_is_left_for(monkeypatch):
+    given = []
+    solved = team_search.TeamSearch._solved
+
+    def noted(search, program, limits, *start):
+        given.append(limits.nodes)
+        return solved(search, program, limits, *start)
+
+    monkeypatch.setattr(team_search.TeamSearch, "_solved", noted)
+    search = team_search.TeamSearch(two_around_a_tower(n_uas=1), BY_NODES, time.perf_counter())
+    search.prepare([0])
+    a_pass = search._joint / team_search._JOINT_DEARER  # of an iteration a row: root, or node
+    most = team_search._AT_LEAST * BY_NODES.work
+    for passes in (3.5, 6.5, 1000.0):
+        search.work = most - passes * a_pass
+        search.improve()
+    search.work = most - 2.9 * a_pass  # less than it takes at least
+    search.improve()
+    assert given == [2, 5, search._nodes(team_search._ALONE_NODES)]

@@ -264,9 +264,10 @@ class TeamSearch:
         """The whole OCP from the best plan so far, with the work that is left.
 
         In the tightest form, since its bound is what is asked for, and the only one that a plan
-        gets; of several UAS the root.
+        gets; of several UAS the root. A node takes an iteration a row, like the root.
         """
-        if not self._joint or self.work + self._joint > _AT_LEAST * self.effort.work:
+        left = _AT_LEAST * self.effort.work - self.work
+        if not self._joint or self._joint > left:
             return
         alone = self.problem.n_uas == 1
         if alone and self.problem.tours:
@@ -276,7 +277,8 @@ class TeamSearch:
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))
-        nodes = self._nodes(_ALONE_NODES if alone else _JOINT_NODES)
+        enough_for = int(left * _JOINT_DEARER / self._joint) - 1
+        nodes = min(self._nodes(_ALONE_NODES), enough_for) if alone else self._nodes(_JOINT_NODES)
         limits = SolverLimits(nodes=nodes, relative_gap=0.01, heuristics=False)
         solution = self._solved(program, limits, start)
         if solution is not None:
