@@ -68,7 +68,7 @@ def test_as_many_uas_are_planned_for_as_the_work_suffices_for(problem, of_one, m
     assert set(first + then) == {0, 1}, "the other one is next"
 
 
-def test_of_one_uas_the_joint_program_gets_as_many_nodes_as_work_is_left_for(monkeypatch):
+def test_the_joint_program_of_one_uas_gets_its_root_and_more_with_more_work(monkeypatch):
     given = []
     solved = team_search.TeamSearch._solved
 
@@ -77,13 +77,9 @@ def test_of_one_uas_the_joint_program_gets_as_many_nodes_as_work_is_left_for(mon
         return solved(search, program, limits, *start)
 
     monkeypatch.setattr(team_search.TeamSearch, "_solved", noted)
-    search = team_search.TeamSearch(two_around_a_tower(n_uas=1), BY_NODES, time.perf_counter())
-    search.prepare([0])
-    a_pass = search._joint / team_search._JOINT_DEARER  # of an iteration a row: root, or node
-    most = team_search._AT_LEAST * BY_NODES.work
-    for passes in (3.5, 6.5, 1000.0):
-        search.work = most - passes * a_pass
+    for work in (1.0, 10.0):
+        effort = dataclasses.replace(BY_NODES, work=work)
+        search = team_search.TeamSearch(two_around_a_tower(n_uas=1), effort, time.perf_counter())
+        search.prepare([0])
         search.improve()
-    search.work = most - 2.9 * a_pass  # less than it takes at least
-    search.improve()
-    assert given == [2, 5, search._nodes(team_search._ALONE_NODES)]
+    assert given == [1, 10]
