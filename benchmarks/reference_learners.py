@@ -49,19 +49,20 @@ VARIANTS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "ppo-waypoint": {
         "no-potentials": ("no potential to waypoints or home", *_POTENTIALS),
         "no-left-open": ("landing does not cost what is left open", f"{_PAYS}.left_open=0.0"),
-        "rewards-alone": ("neither of them", *_POTENTIALS, f"{_PAYS}.left_open=0.0"),
-        "losses-dear": ("a loss costs 10 from the first step on", f"{_PAYS}.violation=10.0"),
-        "losses-cheap": ("a loss costs 4 to the end", f"{_PAYS}.violation=4.0"),
+        "losses-cheap": ("a loss costs 10", f"{_PAYS}.violation=10.0"),
+        "losses-dear": ("a loss costs 20", f"{_PAYS}.violation=20.0"),
+        "patient": ("a second costs 0.01, so that hovering is cheap", f"{_PAYS}.time=0.01"),
         "no-scorer": ("choices are outputs, no scorer", "learning.width=0"),
         "v0": (
             "environment v0: no hold, no climb, no ways, no terms of v1",
             'environment.version="v0"',
-            f"{_PAYS}={{home=10.0, violation=4.0, energy=0.1}}",
+            f"{_PAYS}={{home=10.0, violation=14.0, energy=0.1, time=0.03}}",
         ),
     },
     "ppo-velocity": {
         "same-noise": ("noise 0.3 throughout", "learning.phases.*.noise=[0.3, 0.3]"),
         "no-potentials": ("no potential to waypoints or home", *_POTENTIALS),
+        "no-scorer": ("velocities are outputs, no scorer", "learning.width=0"),
     },
 }
 """Learner -> variant -> its meaning, and what is other than shipped, as `--set` takes it."""
@@ -136,8 +137,9 @@ def table(level: str, rows: Mapping[str, Row], given: argparse.Namespace) -> lis
 
     lines = [HEAD, ("---", *["---:"] * (len(HEAD) - 1))]
     for name, (meaning, settings) in rows.items():
+        tried = max(1, round(20 * min(given.share, 1.0)))  # missions of its own score
         jobs = {
-            given.out / level / f"{name}-{seed}": TrainingJob(name, settings, seed)
+            given.out / level / f"{name}-{seed}": TrainingJob(name, settings, seed, tried)
             for seed in range(given.seeds)
         }
         with Workers(given.jobs) as workers:
