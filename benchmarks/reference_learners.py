@@ -135,7 +135,7 @@ def table(level: str, rows: Mapping[str, Row], given: argparse.Namespace) -> lis
         which = f"{level}, {progress.job.name}, seed {progress.job.seed}"
         sys.stderr.write(f"{which}: round {progress.rounds}, {progress.steps} flown steps\n")
 
-    lines = [HEAD, ("---", *["---:"] * (len(HEAD) - 1))]
+    lines: list[tuple[str, ...]] = [HEAD, ("---", *["---:"] * (len(HEAD) - 1))]
     for name, (meaning, settings) in rows.items():
         tried = max(1, round(20 * min(given.share, 1.0)))  # missions of its own score
         jobs = {
