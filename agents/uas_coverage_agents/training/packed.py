@@ -46,7 +46,7 @@ class Phase(StrictModel):
     """What holds from some step on; a round has the phase in which it begins.
 
     Attributes:
-        begins: At how many steps.
+        begins: At which share of all steps.
         reward_weights: Instead of those of the environment.
         learning_rate: Of Adam.
         ent_coef: Weight of the entropy of the choices.
@@ -56,7 +56,7 @@ class Phase(StrictModel):
             `landing_distance_m`.
     """
 
-    begins: Annotated[int, Field(ge=0)] = 0
+    begins: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     reward_weights: dict[str, float] = Field(default_factory=dict)
     learning_rate: Positive = 7e-4
     ent_coef: NotNegative = 0.0
@@ -158,7 +158,7 @@ class PackedPpo:
         if self._steps >= wanted:
             return
         begins = [phase.begins for phase in self._own.phases]
-        phase = self._own.phases[bisect_right(begins, self._steps) - 1]
+        phase = self._own.phases[bisect_right(begins, self._share) - 1]
         flown = _Flown(self._batch(phase, number), self._own)
         while self._steps < wanted:
             noise = self._noise(phase)
@@ -228,11 +228,15 @@ class PackedPpo:
         batch.reset(self._seed * self._settings.num_envs)
         return batch
 
+    @property
+    def _share(self) -> float:
+        return self._steps / self._settings.total_timesteps
+
     def _noise(self, phase: Phase) -> float:
         """Of actions that are numbers, now."""
         later = [p.begins for p in self._own.phases if p.begins > phase.begins]
-        end = later[0] if later else self._settings.total_timesteps
-        share = min(max((self._steps - phase.begins) / max(end - phase.begins, 1), 0.0), 1.0)
+        past = (self._share - phase.begins) / (min(later, default=1.0) - phase.begins)
+        share = min(max(past, 0.0), 1.0)
         return float(phase.noise[0] ** (1.0 - share) * phase.noise[1] ** share)
 
     def _learn_from(self, rows: "Rows", phase: Phase, noise: float) -> float:
