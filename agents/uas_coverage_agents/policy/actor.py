@@ -17,10 +17,18 @@ from uas_coverage_env.files.strict_toml import StrictModel
 SHARPENED = ("energy_margin", "below")
 """Features of which small values matter: they are read a second time, times `GAIN`."""
 
+OF_FLYING = ("clearance", "fence")
+"""Likewise, where actions are velocities."""
+
 GAIN = 6.0
 REACHES_M = (10.0, 60.0)
 FAR_M = 200.0
 """Distances are read up to here [m]."""
+
+NEARLY_STRAIGHT = 0.999
+"""A slope of 1, with which numbers of an action are velocities themselves, is taken for this."""
+
+AT_FIRST = (0.8, 0.5)
 
 OF_WAYPOINTS = ("waypoints", "ways")
 """Blocks of which each row is about a waypoint, in the same order."""
@@ -28,6 +36,7 @@ OF_WAYPOINTS = ("waypoints", "ways")
 _Column = Annotated[int, Field(ge=0, le=100_000)]
 _Columns = Annotated[tuple[_Column, ...], Field(max_length=10_000)]
 _Vectors = Annotated[tuple[tuple[_Column, _Column, _Column], ...], Field(max_length=1000)]
+_NEVER = -1e9
 _EACH = "candidates."
 _STANDARD = "offset", "scale"
 
@@ -61,6 +70,23 @@ class Candidates(StrictModel):
         return len(self.columns[0]) + len(self.sharp[0]) + 2
 
 
+class Pointing(StrictModel):
+    """Actions that are velocities: along the first leg to a candidate, or home, or anywhere.
+
+    For each of these there is a score, a speed along its leg and what else the action has (a
+    height); all of it is an action, in the environment's numbers, once the rest is added, which is
+    the same for all. Anywhere has no leg: it is the rest alone.
+
+    Attributes:
+        home: Direction (north, east) of the first leg home.
+        slope: Of the action at rest: a number s of it is s · (slope + (1 - slope) · s²) of the
+            vehicle's limit. Speeds are such numbers, too, so that they are fine near rest.
+    """
+
+    home: tuple[_Column, _Column]
+    slope: Annotated[float, Field(gt=0.0, le=NEARLY_STRAIGHT)]
+
+
 class Actor(StrictModel):
     """Layers with tanh over features of the observation; then a score for each choice, or actions.
 
@@ -78,6 +104,7 @@ class Actor(StrictModel):
         velocity: Where its velocity north and east is.
         hidden: Widths of the layers.
         candidates: What there is to choose from; None: actions are no choices.
+        pointing: How candidates become velocities; None: they are choices.
         others: Outputs after the candidates.
         temperature: Choices are drawn with probabilities exp(score / this), as they were while it
             was learned; 0: the best one is taken. UAS that see the same and never draw collide.
@@ -93,6 +120,7 @@ class Actor(StrictModel):
     velocity: tuple[_Column, _Column]
     hidden: Annotated[tuple[Width, ...], Field(min_length=1, max_length=8)]
     candidates: Candidates | None = None
+    pointing: Pointing | None = None
     others: Width
     temperature: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     nearby_m: Annotated[float, Field(gt=0.0)]
@@ -103,6 +131,7 @@ class Actor(StrictModel):
         each = self.candidates
         rows = [*self.vectors, self.columns, self.sharp, self.velocity]
         rows += [*each.columns, *each.sharp, *each.vectors] if each else []
+        rows += [self.pointing.home] if self.pointing else []
         last = max((column for row in rows for column in row), default=0)
         if last >= self.inputs:
             raise ValueError(f"column {last} is read, and there are {self.inputs}")
@@ -120,6 +149,7 @@ class Actor(StrictModel):
         rows: int,
         temperature: float,
         environment: dict[str, Any],
+        slope: float | None = None,
     ) -> "Actor":
         """The network for an observation.
 
@@ -133,9 +163,11 @@ class Actor(StrictModel):
             rows: How many waypoints the layers see.
             temperature: See `Actor`.
             environment: See `Actor`.
+            slope: Of velocities that candidates become, see `Pointing`; None: they do not.
         """
         table = _columns_of(blocks)
-        of_all, of_each = _Read(), [_Read() for _ in range(choices)]
+        sharp = SHARPENED if slope is None else (*SHARPENED, *OF_FLYING)
+        of_all, of_each = _Read(sharp), [_Read(sharp) for _ in range(choices)]
         for name, rows_of in table.items():
             for row in rows_of[:rows] if name in OF_WAYPOINTS else rows_of:
                 of_all.add(row)
@@ -151,6 +183,11 @@ class Actor(StrictModel):
                 vectors=tuple(one.vectors[-1] for one in of_each),
                 width=width,
             )
+        pointing, others = None, outputs - choices
+        if choices and slope is not None:
+            home = table["home"][0]["direction"]
+            pointing = Pointing(home=home, slope=min(slope, NEARLY_STRAIGHT))
+            others = 2 * outputs + 2
         return cls(
             inputs=sum(block.size for block in blocks),
             columns=tuple(of_all.columns),
@@ -159,7 +196,8 @@ class Actor(StrictModel):
             velocity=(north, east),
             hidden=hidden,
             candidates=each,
-            others=outputs - choices,
+            pointing=pointing,
+            others=others,
             temperature=temperature,
             nearby_m=NEARBY_M,
             environment=environment,
@@ -167,7 +205,9 @@ class Actor(StrictModel):
 
     @property
     def outputs(self) -> int:
-        """Numbers that it gives."""
+        """Choices that it scores, or numbers of an action."""
+        if self.pointing:
+            return self.others // 2 - 1
         return self.others + (len(self.candidates.columns) if self.candidates else 0)
 
     @property
@@ -185,10 +225,11 @@ class Actor(StrictModel):
         shapes |= {"others.weight": (self.others, last + self.features)}
         shapes |= {"others.bias": (self.others,)}
         if each := self.candidates:
+            per_each = self.outputs + 1 if self.pointing else 1
             parts = {
                 **{name: (each.inputs,) for name in _STANDARD},
                 "one.weight": (each.width, each.inputs), "one.bias": (each.width,),
-                "all.weight": (each.width, last), "score.weight": (1, each.width),
+                "all.weight": (each.width, last), "score.weight": (per_each, each.width),
             }  # fmt: skip
             shapes |= {_EACH + name: shape for name, shape in parts.items()}
         return shapes
@@ -227,7 +268,8 @@ class Actor(StrictModel):
             inputs: (..., inputs).
 
         Returns:
-            (..., candidates + others).
+            (..., candidates + others); with `pointing` (..., components, 1 + numbers): the score
+            of each, and its action.
         """
         inputs = np.asarray(inputs, dtype=np.float64)
         x = seen = (self.read(inputs) - tensors["offset"]) * tensors["scale"]
@@ -240,12 +282,66 @@ class Actor(StrictModel):
         of = {name.removeprefix(_EACH): t for name, t in tensors.items() if name.startswith(_EACH)}
         one = (self.read_of_each(inputs) - of["offset"]) * of["scale"]
         both = one @ of["one.weight"].T + of["one.bias"] + (x @ of["all.weight"].T)[..., None, :]
-        scores = np.tanh(both) @ of["score.weight"][0]
-        return np.concatenate([scores, others], axis=-1)
+        scored = np.tanh(both) @ of["score.weight"].T
+        if self.pointing is None:
+            return np.concatenate([scored[..., 0], others], axis=-1)
+        return self.pointed(np, scored, others, self.read(inputs), self.read_of_each(inputs))
+
+    def pointed(self, maths: Any, scored: Any, others: Any, read: Any, each: Any) -> Any:
+        """Scores and actions of all components, in NumPy or torch.
+
+        Args:
+            maths: Either of them.
+            scored: (..., candidates, numbers) what the scorer gives.
+            others: (..., 2 numbers + 1) the same of home, the score of anywhere, and the rest.
+            read: See `read`.
+            each: See `read_of_each`; of a candidate that is not there all columns are 0.
+
+        Returns:
+            (..., candidates + 2, 1 + numbers).
+        """
+        assert self.candidates is not None and self.pointing is not None
+        n, slope, columns = self.outputs, self.pointing.slope, self.candidates.columns[0]
+        named = maths.concatenate([scored, others[..., None, : n + 1]], -2)
+        to_each = each[..., [columns.index(column) for column in self.candidates.vectors[0][:2]]]
+        level = 0.0
+        for k, reach_m in enumerate(REACHES_M):
+            shares = maths.clip(FAR_M / reach_m * each[..., -2:-1], 0.0, 1.0)
+            home = read[..., None, self._home_within(k)]
+            gain = finely(maths.tanh(named[..., k + 1 : k + 2] + AT_FIRST[k]), slope)
+            level = level + gain * maths.concatenate([shares * to_each, home], -2)
+        along = on_straight_line(maths, level, slope)
+        above = named[..., len(REACHES_M) + 1 :]
+        low = maths.concatenate([0.0 * above[..., :-1, :], 0.0 * above[..., -1:, :] - 1.2], -2)
+        along = maths.concatenate([along, above + low], -1)
+        anywhere = 0.0 * along[..., :1, :]
+        actions = maths.concatenate([along, anywhere], -2) + others[..., None, n + 2 :]
+        there = (each[..., : len(columns)] != 0.0).any(-1)
+        scores = maths.where(there, scored[..., 0], _NEVER)
+        scores = maths.concatenate([scores, others[..., [0, n + 1]] - 1.0], -1)
+        return maths.concatenate([scores[..., None], actions], -1)
+
+    def _home_within(self, k: int) -> list[int]:
+        """Where `read` has the way home, shortened to a reach."""
+        assert self.pointing is not None
+        at = [vector[:2] for vector in self.vectors].index(self.pointing.home)
+        first, n = len(self.columns) + len(self.sharp), len(self.vectors)
+        return [first + 2 * k * n + at, first + (2 * k + 1) * n + at]
 
     def _distance(self, closeness: NDArray[np.floating]) -> NDArray[Any]:
         nearest = self.nearby_m / (self.nearby_m + FAR_M)
         return self.nearby_m / np.maximum(closeness, nearest) - self.nearby_m
+
+
+def finely(number: Any, slope: float) -> Any:
+    """Share of the limit that a number of the velocity action is."""
+    return number * (slope + (1.0 - slope) * number * number)
+
+
+def on_straight_line(maths: Any, share: Any, slope: float) -> Any:
+    """The number that is this share of the limit: the one root of a cubic that rises everywhere."""
+    bend = (3.0 * (1.0 - slope) / slope) ** 0.5
+    return 2.0 / bend * maths.sinh(maths.asinh(1.5 / slope * bend * share) / 3.0)
 
 
 _Row = dict[str, tuple[int, ...]]
@@ -270,6 +366,7 @@ def _columns_of(blocks: Sequence[Group]) -> dict[str, list[_Row]]:
 class _Read:
     """Columns that are read, as in `Actor`."""
 
+    sharpened: tuple[str, ...]
     columns: list[int] = field(default_factory=list)
     sharp: list[int] = field(default_factory=list)
     vectors: list[Any] = field(default_factory=list)
@@ -277,6 +374,6 @@ class _Read:
     def add(self, row: _Row) -> None:
         """Read a row of a block."""
         self.columns += [column for columns in row.values() for column in columns]
-        self.sharp += [column for name in SHARPENED for column in row.get(name, ())]
+        self.sharp += [column for name in self.sharpened for column in row.get(name, ())]
         if "direction" in row:
             self.vectors.append((*row["direction"], *(row.get("leg") or row["closeness"])))

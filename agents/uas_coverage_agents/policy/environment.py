@@ -47,7 +47,7 @@ def keywords_of(policy: Policy) -> dict[str, Any]:
     if not policy.description.observation.has_the_numbers_of(observed(keywords)):
         raise ValueError("its observation is not that of this version; train it anew")
     wanted = settings.kind.choices or settings.kind.size
-    if network.outputs != wanted or (network.candidates and not settings.chooses):
+    if network.outputs != wanted or bool(network.candidates) and settings.chooses == bool(network.pointing):
         raise ValueError(f"network: {network.outputs} outputs for action {settings.kind.name!r}")
     return keywords
 
@@ -66,10 +66,18 @@ def action_of(policy: Policy, seed: int = 0) -> Callable[[Any], Any]:
         ValueError: See `keywords_of`.
     """
     rng = np.random.default_rng(seed)
-    temperature = getattr(policy.description.network, "temperature", 0.0)
+    network = policy.description.network
+    temperature = getattr(network, "temperature", 0.0)
 
     def actions(seen: Any) -> Any:
-        return np.clip(policy.forward(seen), -1.0, 1.0).astype(np.float32)
+        found = policy.forward(seen)
+        if getattr(network, "pointing", None):
+            scores = found[..., 0]
+            if temperature > 0.0:
+                scores = scores + temperature * rng.gumbel(size=scores.shape)
+            best = scores.argmax(-1)[..., None, None]
+            found = np.take_along_axis(found, best, -2)[..., 0, 1:]
+        return np.clip(found, -1.0, 1.0).astype(np.float32)
 
     def choices(seen: Any) -> Any:
         scores = policy.forward(seen["observation"])

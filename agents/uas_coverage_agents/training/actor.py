@@ -41,7 +41,8 @@ class ActorCritic(nn.Module):
         if each := network.candidates:
             self.one = nn.Linear(each.inputs, each.width)
             self.all = nn.Linear(last, each.width, bias=False)
-            self.score = nn.Linear(each.width, 1, bias=False)
+            per_each = network.outputs + 1 if network.pointing else 1
+            self.score = nn.Linear(each.width, per_each, bias=False)
             small.append(self.score)
             self.register_buffer("each_offset", torch.zeros(each.inputs))
             self.register_buffer("each_scale", torch.ones(each.inputs))
@@ -64,10 +65,11 @@ class ActorCritic(nn.Module):
         Args:
             read: (N, features).
             each: (N, candidates, their inputs); None: there are none.
-            exists: (N, candidates) which of them are there.
+            exists: (N, candidates) which of them are there; None: those of which any is not 0.
         """
         _standardise(read, self.offset, self.scale)
         if each is not None:
+            exists = each[:, :, : -2].any(2) if exists is None else exists
             _standardise(each[exists], self.each_offset, self.each_scale)
 
     def outputs(self, read: Tensor, each: Tensor | None) -> Tensor:
@@ -78,8 +80,10 @@ class ActorCritic(nn.Module):
         if each is None:
             return others
         one = self.one((each - self.each_offset) * self.each_scale)
-        scores = self.score(torch.tanh(one + self.all(x)[:, None]))[:, :, 0]
-        return torch.cat([scores, others], 1)
+        scored = self.score(torch.tanh(one + self.all(x)[:, None]))
+        if self.network.pointing:
+            return self.network.pointed(torch, scored, others, read, each)
+        return torch.cat([scored[:, :, 0], others], 1)
 
     def values(self, read: Tensor) -> Tensor:
         """(N,) what the critic expects."""
