@@ -1,52 +1,71 @@
-"""Reference learners on the levels: trains and scores them, writes docs/level_scores.md.
+"""What learners reach on the levels, and what each part of one is worth: trains, scores, publishes.
 
-    python benchmarks/reference_learners.py --out reference             # the budgets of their files
-    python benchmarks/reference_learners.py --out reference --share 0.1 # a tenth of the steps
-    python benchmarks/reference_learners.py --out reference --publish   # and the table
+    python benchmarks/reference_learners.py --seeds 5 --publish "reference learners: {}"
+    python benchmarks/reference_learners.py --levels hard --learners ppo-waypoint --seeds 5
+    python benchmarks/reference_learners.py --levels hard --learners ppo-waypoint --variants all \
+        --share 0.25 --split validation --publish "{} ppo-waypoint ablation"
 
-Learners are those of `uas-coverage train`, or a .toml of your own. Whatever is finished is not
-repeated: a kill costs the rounds that are under way, and the missions that are flown. Needs the
-extra `learn`.
+Learners are those of `uas-coverage train`, or a .toml of your own; variants are settings that
+depart from theirs (`VARIANTS`). Trainings that are finished are not repeated, others go on; their
+policies fly the missions of a split side by side where they can. Needs the extra `learn`.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from learners import put
+from uas_coverage_agents.training.rounds import POLICY, TrainingJob, TrainingProgress, train
+from uas_coverage_agents.training.score import Validation
 from uas_coverage_agents.training.settings import FOLDER, LearnerSettings, settings_of
 
+from uas_coverage_env.env.versions import V0
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.leaderboard import Row
-from uas_coverage_env.leaderboard.flying import flown
-from uas_coverage_env.runner.store import opened
 from uas_coverage_env.runner.workers import Workers
-from uas_coverage_env.tasks import LEVELS, Score
-from uas_coverage_env.tasks.scoring import DESCRIPTION, MissionScore, entry_of, scored, spec_of
+from uas_coverage_env.tasks import LEVELS, level_named, score
+from uas_coverage_env.tasks.scoring import MissionScore, batched, scored
+from uas_coverage_env.tasks.table import shown
+from uas_coverage_env.tasks.task import level_name
 
-PAGE = Path(__file__).parents[1] / "docs" / "level_scores.md"
-FIRST, LAST = "<!-- reference learners: {} -->\n", "<!-- end of reference learners: {} -->"
+DOCS = Path(__file__).parents[1] / "docs"
 REFERENCE = sorted(
     path.stem for path in FOLDER.glob("*.toml") if not path.stem.startswith(("learned-", "ppo-"))
 )
 HEAD = (
     "learner", "flown steps", "processor time, s", "trainings", "score [95 %]", "covered, %",
-    "lost or not home", "energy, %", "return", "missions",
+    "home, %", "energy, %", "return", "missions",
 )  # fmt: skip
 
+Row = tuple[str, LearnerSettings]
+"""Its meaning, and what is trained."""
 
-@dataclass(frozen=True)
-class Result:
-    """A learner on a level: all of its trainings."""
+_PAYS = "learning.phases.*.reward_weights"
+_POTENTIALS = (f"{_PAYS}.to_waypoint=0.0", f"{_PAYS}.to_home=0.0")
 
-    name: str
-    summary: str
-    steps: int
-    process_s: float
-    trainings: int
-    score: Score
+VARIANTS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "ppo-waypoint": {
+        "no-potentials": ("no potential to waypoints or home", *_POTENTIALS),
+        "no-left-open": ("landing does not cost what is left open", f"{_PAYS}.left_open=0.0"),
+        "losses-cheap": ("a loss costs 10", f"{_PAYS}.violation=10.0"),
+        "losses-dear": ("a loss costs 20", f"{_PAYS}.violation=20.0"),
+        "patient": ("a second costs 0.01, so that hovering is cheap", f"{_PAYS}.time=0.01"),
+        "no-scorer": ("choices are outputs, no scorer", "learning.width=0"),
+        "v0": (
+            "environment v0: no hold, no climb, no ways, no terms of v1",
+            'environment.version="v0"',
+            f"{_PAYS}={{home=10.0, violation=14.0, energy=0.1, time=0.03}}",
+        ),
+    },
+    "ppo-velocity": {
+        "same-noise": ("noise 0.3 throughout", "learning.phases.*.noise=[0.3, 0.3]"),
+        "no-potentials": ("no potential to waypoints or home", *_POTENTIALS),
+        "no-scorer": ("velocities are outputs, no scorer", "learning.width=0"),
+    },
+}
+"""Learner -> variant -> its meaning, and what is other than shipped, as `--set` takes it."""
 
 
 def main() -> int:
@@ -54,133 +73,113 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--levels", default="easy", help=f"of {', '.join(LEVELS)}")
     parser.add_argument("--learners", default=",".join(REFERENCE))
-    parser.add_argument("--seeds", type=int, default=1, help="trainings of each learner")
-    parser.add_argument("--share", type=float, default=1.0, help="of the steps of their files")
-    parser.add_argument("--missions", type=int, default=20, help="test missions of each training")
+    parser.add_argument("--variants", default="", help="with commas between them, or all")
+    parser.add_argument("--seeds", type=int, default=1, help="trainings of each row")
+    parser.add_argument("--share", type=float, default=1.0, help="of the steps of the settings")
+    parser.add_argument("--missions", type=int, default=50, help="on which each is scored")
+    parser.add_argument("--split", default="test", choices=("validation", "test"))
     parser.add_argument("--jobs", type=int, default=1, help="trainings side by side")
     parser.add_argument("--out", type=Path, default=Path("reference"))
-    parser.add_argument("--publish", action="store_true", help="write docs/level_scores.md")
+    parser.add_argument("--publish", default="", help="mark on a page of docs; {} is the level")
     given = parser.parse_args()
     if given.seeds < 1 or not 0.0 < given.share <= 100.0 or not 1 <= given.missions <= 50:
         parser.error("--seeds: 1 or more; --share: above 0, at most 100; --missions: 1 to 50")
-    levels, parts = given.levels.split(","), {}
     try:
-        for level in levels:
-            if level not in LEVELS:
-                raise InputError(f"--levels {level}: is none of {', '.join(LEVELS)}")
-            learners = {Path(n).stem: settings(n, level, given) for n in given.learners.split(",")}
-            results = [result_of(name, each, given) for name, each in learners.items()]
-            run = command(given, level)
-            parts[level] = f"\n`{LEVELS[level].id}`: `{run}`\n\n{table(results)}\n\n"
+        wanted = {level: dict(rows_of(level, given)) for level in given.levels.split(",")}
+        pages = {level: page_of(given.publish.format(level)) for level in wanted}
+        usual = {action.dest: action.default for action in parser._actions}
+        for level, rows in wanted.items():
+            text = f"`{command({**vars(given), 'levels': level}, usual)}`\n\n"
+            text += "\n".join(f"| {' | '.join(line)} |" for line in table(level, rows, given))
+            sys.stdout.write(f"{text}\n")
+            if page := pages[level]:
+                put(given.publish.format(level), text, page)
     except InputError as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
-    for level, text in parts.items():
-        sys.stdout.write(text)
-        if given.publish:
-            publish(level, text)
     return 0
 
 
-def settings(name: str, level: str, given: argparse.Namespace) -> LearnerSettings:
-    """A learner on a level, with a part of its budget."""
-    found = settings_of(name, scenario=level)
-    steps = max(1, round(given.share * found.total_timesteps))
-    return found.model_copy(update={"total_timesteps": steps})
+def rows_of(level: str, given: argparse.Namespace) -> Iterator[tuple[str, Row]]:
+    """Name -> meaning and settings, of what is trained on a level."""
+    if level not in LEVELS:
+        raise InputError(f"--levels {level}: is none of {', '.join(LEVELS)}")
+    for learner in given.learners.split(","):
+        stem, known = Path(learner).stem, VARIANTS.get(Path(learner).stem, {})
+        shipped = settings_of(learner, scenario=level)
+        steps = f"total_timesteps={max(1, round(given.share * shipped.total_timesteps))}"
+        yield stem, (shipped.summary, settings_of(learner, scenario=level, changes=[steps]))
+        named = known if given.variants == "all" else filter(None, given.variants.split(","))
+        for name in named:
+            if name not in known:
+                raise InputError(f"--variants {name}: {stem} has {', '.join(known) or 'none'}")
+            meaning, *changes = known[name]
+            settings = settings_of(learner, scenario=level, changes=[steps, *changes])
+            yield f"{stem}-{name}", (meaning, settings)
 
 
-def publish(level: str, text: str) -> None:
-    """Write the table of a level into the page."""
-    first, last = FIRST.format(level), LAST.format(level)
-    before, there, rest = PAGE.read_text("utf-8").partition(first)
-    _, end, after = rest.partition(last)
-    if not there or not end:
-        raise SystemExit(f"{PAGE}: has no {first.strip()} ... {last}")
-    PAGE.write_text(before + first + text + last + after, encoding="utf-8")
+def page_of(mark: str) -> Path | None:
+    """The page of docs that has a mark; None: it is empty."""
+    if not mark:
+        return None
+    for page in sorted(DOCS.glob("*.md")):
+        if f"<!-- {mark} -->" in page.read_text("utf-8"):
+            return page
+    raise InputError(f"--publish: no page of docs has <!-- {mark} -->")
 
 
-def result_of(name: str, learner: LearnerSettings, given: argparse.Namespace) -> Result:
-    """Train and score what was not before."""
-    from uas_coverage_agents.training.rounds import POLICY, TrainingJob, TrainingProgress, train
-    from uas_coverage_agents.training.score import Validation
-
-    level = learner.scenario
-    folder = given.out / level
-    jobs = {
-        folder / f"{name}-{seed}": TrainingJob(name, learner, seed) for seed in range(given.seeds)
-    }
+def table(level: str, rows: Mapping[str, Row], given: argparse.Namespace) -> list[tuple[str, ...]]:
+    """The lines of a table; steps and processor time are those of one training."""
 
     def told(progress: TrainingProgress) -> None:
-        which = f"{level}, {name}-{progress.job.seed}"
+        which = f"{level}, {progress.job.name}, seed {progress.job.seed}"
         sys.stderr.write(f"{which}: round {progress.rounds}, {progress.steps} flown steps\n")
 
-    with Workers(given.jobs) as workers:
-        policies = train(jobs, Validation(workers), told)
-    trained = [policy.description.training for policy in policies.values()]
-    missions = [one for place in jobs for one in score_of(place / POLICY, level, given.missions)]
-    return Result(
-        name,
-        learner.summary,
-        round(sum(each.steps for each in trained) / len(trained)),
-        sum(each.process_s for each in trained) / len(trained),
-        len(trained),
-        scored(level, missions),
-    )
-
-
-def score_of(policy: Path, level: str, missions: int) -> list[MissionScore]:
-    """The first test missions of a level; those that the folder holds are not flown again."""
-    task = LEVELS[level]
-    spec = spec_of(f"policy:{policy}", task)
-    with opened(policy.parent / "flights", DESCRIPTION, Row) as store:
-        kept, found = {row.key: row for row in store.rows()}, []
-        for seed, scenario in task.scenarios("test", missions).items():
-            entry = entry_of(spec, task, seed, scenario)
-            row = kept.get(entry.key)
-            if row is None:
-                row = Row.of(entry, flown(entry), "")
-                store.add(row)
-            found.append(MissionScore.of(row))
-    return found
-
-
-def table(results: list[Result]) -> str:
-    """A Markdown table; steps and processor time are those of one training."""
-    lines = [HEAD, ("---", *["---:"] * (len(HEAD) - 1))]
-    for one in results:
-        found, flown = one.score.score, one.score
-        value = "–" if found.value is None else f"{found.value:.2f}"
-        if found.low is not None:
-            value += f" [{found.low:.2f}, {found.high:.2f}]"
-        n_uas = sum(mission.n_uas for mission in flown.missions)
-        home = sum(mission.home for mission in flown.missions)
+    lines: list[tuple[str, ...]] = [HEAD, ("---", *["---:"] * (len(HEAD) - 1))]
+    for name, (meaning, settings) in rows.items():
+        tried = max(1, round(20 * min(given.share, 1.0)))  # missions of its own score
+        jobs = {
+            given.out / level / f"{name}-{seed}": TrainingJob(name, settings, seed, tried)
+            for seed in range(given.seeds)
+        }
+        with Workers(given.jobs) as workers:
+            policies = train(jobs, Validation(workers), told)
+        trained = [policy.description.training for policy in policies.values()]
+        flown = level_name(level, settings.environment.version or V0.name)
+        missions = [each for place in policies for each in missions_of(place, flown, given)]
+        found = scored(flown, missions)
+        home = sum(each.home for each in missions) / sum(each.n_uas for each in missions)
         lines.append(
             (
-                f"`{one.name}`: {one.summary}",
-                f"{one.steps:,}".replace(",", " "),
-                f"{one.process_s:.0f}",
-                str(one.trainings),
-                value,
-                f"{100.0 * flown.mean('coverage'):.1f}",
-                f"{n_uas - home} of {n_uas}",
-                f"{100.0 * flown.mean('energy_share'):.1f}",
-                f"{flown.mean('episode_return'):.1f}",
-                str(len(flown.missions)),
+                f"`{name}`: {meaning}",
+                f"{sum(each.steps for each in trained) / len(trained):,.0f}".replace(",", " "),
+                f"{sum(each.process_s for each in trained) / len(trained):.0f}",
+                f"{len(trained)}",
+                shown(found.score),
+                f"{100.0 * found.mean('coverage'):.1f}",
+                f"{100.0 * home:.1f}",
+                f"{100.0 * found.mean('energy_share'):.1f}",
+                f"{found.mean('episode_return'):.1f}",
+                f"{len(missions)}",
             )
         )
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return lines
 
 
-def command(given: argparse.Namespace, level: str) -> str:
+def missions_of(place: Path, level: str, given: argparse.Namespace) -> tuple[MissionScore, ...]:
+    """The missions of a level as the policy of a training flies them."""
+    planner = f"policy:{place / POLICY}"
+    batch = given.missions if batched(planner, level_named(level)) else None
+    return score(planner, level, missions=given.missions, split=given.split, batch=batch).missions
+
+
+def command(given: Mapping[str, object], usual: Mapping[str, object]) -> str:
     """The line that makes the table of a level again."""
-    parts = ["python benchmarks/reference_learners.py"]
-    asked = {**vars(given), "levels": level}
-    usual = {
-        "levels": "easy", "learners": ",".join(REFERENCE), "seeds": 1, "share": 1.0,
-        "missions": 20,
-    }  # fmt: skip
-    parts += [f"--{name} {asked[name]}" for name in usual if asked[name] != usual[name]]
-    return " ".join([*parts, "--out reference --publish"])
+    words = ["python benchmarks/reference_learners.py"]
+    for name, value in given.items():
+        if name not in ("jobs", "publish", "out") and value != usual[name]:
+            words.append(f"--{name} {value}")
+    return " ".join([*words, f"--out {Path(str(given['out'])).name}"])
 
 
 if __name__ == "__main__":

@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 import torch
 from uas_coverage_agents.policy.actor import Actor
-from uas_coverage_agents.policy.environment import ActorRunner, action_of, keywords_of
-from uas_coverage_agents.training import packed
+from uas_coverage_agents.policy.environment import action_of, keywords_of
+from uas_coverage_agents.training import draws, packed
 from uas_coverage_agents.training.learner import Told
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.packed import PackedPpo, advantages_of
 from uas_coverage_agents.training.rounds import TrainingJob, policy_of, train
 from uas_coverage_agents.training.settings import settings_of
 
-from uas_coverage_env import MissionBrief, generate_scenario, load_planner, rollout
+from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.env import HOME_CHOICE, CoverageBatch
 from uas_coverage_env.files.strict_toml import InputError
-from uas_coverage_env.flight import Assistants
-from uas_coverage_env.mission import first_sight
 
 TINY = (
     *("num_envs=2", "rounds=2", "total_timesteps=64", "size.n_uas=[2,2]"),
@@ -131,25 +129,30 @@ def test_a_masked_choice_is_never_taken_neither_in_flight_nor_with_noise():
     with torch.no_grad():
         outputs = learner._model.outputs(*learner._model.read(seen))
         for _ in range(50):
-            drawn, likely = packed._drawn(outputs, torch.from_numpy(masks), 1.0)
+            drawn, likely = draws.drawn(outputs, torch.from_numpy(masks), 1.0)
             assert masks[rows, drawn.numpy()].all()
             assert torch.isfinite(likely).all()
 
 
-def test_choices_are_drawn_in_flight_as_the_seed_of_the_mission_says_or_the_best_is_taken():
-    scenario = generate_scenario(900_501, n_uas=2, n_waypoints=8, n_obstacles=0)
-    brief = MissionBrief.of(scenario)
-    swarm = first_sight(brief)
-
-    def chosen(temperature, seed):
-        settings = tiny("ppo-waypoint", f"learning.temperature={temperature}")
-        runner = ActorRunner(policy(made(settings), settings), Assistants())
-        runner.reset(brief, seed)
-        return [runner.act(swarm)["uas_1"] for _ in range(20)]
-
-    assert chosen(100.0, 3) == chosen(100.0, 3) != chosen(100.0, 4)
-    assert len(set(map(str, chosen(100.0, 3)))) > 2
-    assert chosen(0.0, 3) == chosen(0.0, 4)
+def test_choices_are_drawn_in_flight_as_often_as_learned_and_by_what_is_observed_alone():
+    settings = tiny("ppo-waypoint", "learning.temperature=0.5")
+    found = policy(learned(settings), settings)
+    seen, masks = observed(settings)
+    row, mask = seen[0], masks[0]
+    rows = np.repeat(row[np.newaxis], 4000, axis=0)
+    rows[:, 0] = np.linspace(-1e-3, 1e-3, len(rows))  # all but the same
+    choose = action_of(found)
+    chosen = choose({"observation": rows, "action_mask": mask})
+    scores = np.where(mask, found.forward(row) / 0.5, -np.inf)
+    wanted = np.exp(scores - scores.max())
+    np.testing.assert_allclose(
+        np.bincount(chosen, minlength=len(wanted)) / len(rows), wanted / wanted.sum(), atol=0.03
+    )
+    again = [choose({"observation": each, "action_mask": mask}) for each in rows[:50]]
+    assert np.array_equal(again, chosen[:50])
+    settings = tiny("ppo-waypoint", "learning.temperature=0")
+    best = action_of(policy(learned(settings), settings))
+    assert np.ptp(best({"observation": rows, "action_mask": mask})) == 0
 
 
 def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
@@ -196,7 +199,7 @@ def test_advantages_look_ahead_to_an_end_and_not_beyond():
 
 
 def test_noise_falls_from_the_begin_of_a_phase_to_its_end():
-    phases = "[{noise=[0.4, 0.1]}, {begins=200, noise=[0.1, 0.05]}]"
+    phases = "[{noise=[0.4, 0.1]}, {begins=0.5, noise=[0.1, 0.05]}]"
     changes = "total_timesteps=400", f"learning.phases={phases}"
     learner = made(tiny("ppo-velocity", *changes))
     first, second = learner._own.phases
@@ -207,24 +210,34 @@ def test_noise_falls_from_the_begin_of_a_phase_to_its_end():
     assert found == pytest.approx([0.4, 0.2, 0.1, 0.1, 0.05])
 
 
-def test_a_phase_pays_by_its_own_weights_in_missions_of_its_lesson():
+def test_a_phase_pays_by_its_own_weights_and_lessons_are_as_many_missions_as_it_says():
     phases = """[
-        {reward_weights={home=1.0}, lesson={landing_distance_m=4.0}},
-        {begins=32, reward_weights={home=7.0}},
+        {reward_weights={home=1.0}, lessons={landing=0.25, near=0.5}},
+        {begins=0.5, reward_weights={home=7.0}},
     ]"""
-    learner = made(tiny("ppo-waypoint", f"learning.phases={phases}"))
+    learner = made(tiny("ppo-waypoint", f"learning.phases={phases}", "learning.missions=8"))
     first, second = (learner._batch(phase, 0) for phase in learner._own.phases)
     at = first.settings.term_names.index("home")
     assert [first.settings.weights[at], second.settings.weights[at]] == [1.0, 7.0]
-    assert [one.scenario_of(0).landing_distance_m for one in (first, second)] == [4.0, 2.0]
+    missions = [learner._missions.mission(k) for k in range(8)]
+    taught = learner._own.phases[0].taught(missions)
+    wide = [each.landing_distance_m > 2.0 for each in taught]
+    near = [len(each.waypoints) == len(each.uas) for each in taught]
+    assert wide == [True] * 2 + [False] * 6
+    assert near == [False] * 2 + [True] * 4 + [False] * 2
+    assert taught[6:] == missions[6:]
+    assert first.scenario_of(0).landing_distance_m > second.scenario_of(0).landing_distance_m
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("phases=[{begins=5}]", "give 0 first"),
+        ("phases=[{begins=0.5}]", "give 0 first"),
+        ("phases=[{begins=0.0},{begins=3000.0}]", "less than 1"),
         ("phases=[{reward_weights={homme=1.0}}]", "homme"),
-        ("phases=[{lesson={tolerance=1.0}}]", "tolerance"),
+        ("phases=[{lessons={flying=1.0}}]", "'flying' is none that changes missions"),
+        ("phases=[{lessons={assisted=1.0}}]", "'assisted' is none that changes missions"),
+        ("phases=[{lessons={few=0.6, near=0.5}}]", "shares of 1.1"),
         ("gamma=1.5", "gamma"),
     ],
 )

@@ -22,8 +22,8 @@ def trained(tmp_path, monkeypatch):
     monkeypatch.setattr(curve, "write", curve.write_table)
 
     def training(name, *changes, scenario):
+        changes = (*changes, "rounds=1", "total_timesteps=20")
         settings = tiny(name, *changes, scenario=scenario)
-        settings = settings.model_copy(update={"rounds": 1, "total_timesteps": 20})
         train({tmp_path / name: TrainingJob("tiny", settings, missions=1)})
         return f"policy:{tmp_path / name / 'policy'}"
 
@@ -46,6 +46,15 @@ def test_a_policy_is_worth_the_same_side_by_side_and_one_by_one(name, changes, l
         # networks round otherwise in rows; what they fly is the same
         for figure in ("value", "steps", "coverage", "home", "episode_return"):
             assert getattr(one, figure) == pytest.approx(getattr(other, figure), rel=1e-3)
+
+
+def test_what_draws_its_choices_draws_the_same_side_by_side_and_one_by_one(trained):
+    policy = trained("ppo-waypoint", scenario="hard")
+    alone = score(policy, "hard-v1", missions=3)
+    together = score(policy, "hard-v1", missions=3, batch=2)
+    for one, other in zip(alone.missions, together.missions, strict=True):
+        for figure in ("value", "steps", "coverage", "home", "episode_return"):
+            assert getattr(one, figure) == pytest.approx(getattr(other, figure), rel=1e-9)
 
 
 def test_a_policy_that_remembers_flies_one_by_one(trained):

@@ -88,6 +88,30 @@ def test_a_change_that_does_not_fit_is_named(change, words):
     assert words in refusal("ppo", changes=[change])
 
 
+def test_a_change_reaches_one_table_of_a_list_or_all_of_them():
+    changes = "learning.phases.1.noise=[0.3, 0.1]", "learning.phases.*.reward_weights.home=7.0"
+    shipped, changed = settings_of("ppo-velocity"), settings_of("ppo-velocity", changes=changes)
+    for number, (before, after) in enumerate(
+        zip(shipped.learning["phases"], changed.learning["phases"], strict=True)
+    ):
+        assert before["reward_weights"]["home"] != 7.0
+        noise = [0.3, 0.1] if number == 1 else before["noise"]
+        weights = {**before["reward_weights"], "home": 7.0}
+        assert after == {**before, "noise": noise, "reward_weights": weights}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("learning.phases.2.noise=[1.0, 1.0]", "there is no table '2'"),
+        ("learning.phases.last.noise=[1.0, 1.0]", "there is no table 'last'"),
+        ("learning.phases.*.noise.0=1.0", "noise is a list; give it as a whole"),
+    ],
+)
+def test_a_change_of_a_list_that_does_not_fit_is_named(change, words):
+    assert words in refusal("ppo-velocity", changes=[change])
+
+
 def test_mistakes_in_names_are_answered_with_what_there_is():
     assert "did you mean mappo" in refusal("mapo")
     assert "no such file" in refusal("nowhere/mine.toml")

@@ -9,6 +9,7 @@ import pickle
 import subprocess
 import sys
 from dataclasses import fields
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -17,7 +18,7 @@ from own_blocks import beacon
 from practice_grounds import practice_ground
 
 import uas_coverage_env
-from uas_coverage_env import MissionBrief, registration, uas_coverage_v0
+from uas_coverage_env import MissionBrief, registration, uas_coverage_v0, uas_coverage_v1
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.env import (
     ACTIONS,
@@ -200,6 +201,9 @@ def test_an_environment_of_a_version_can_be_pickled():
         uas_coverage_v0.env,
         uas_coverage_v0.raw_env,
         uas_coverage_v0.vector_env,
+        uas_coverage_v1.env,
+        uas_coverage_v1.raw_env,
+        uas_coverage_v1.vector_env,
         CoverageBatch,
         CoverageSwarmEnv,
         CoverageVectorEnv,
@@ -212,6 +216,19 @@ def test_every_setting_is_in_signature_and_docstring(door):
         assert parameters[name].annotation == kind
         assert f"{name}: " in text
     assert all(each.kind != each.VAR_KEYWORD for each in parameters.values())
+
+
+def test_what_makes_environments_is_of_its_own_version_and_can_be_pickled():
+    ground = practice_ground()
+    for module in (uas_coverage_v0, uas_coverage_v1):
+        for door in (module.env, module.raw_env, module.vector_env):
+            assert pickle.loads(pickle.dumps(door)) is door
+        assert module.vector_env(2, ground).version is module.VERSION
+        assert module.env(ground).unwrapped.version is module.VERSION
+    for name, value, words in (("speed", 3, "argument 'speed'"), ("device", "tpu", "is 'tpu'")):
+        wrong: Any = {name: value}
+        with pytest.raises(ValueError, match=words):
+            uas_coverage_v1.vector_env(2, ground, **wrong)
 
 
 def test_every_setting_is_a_keyword_argument():

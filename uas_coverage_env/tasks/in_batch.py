@@ -1,7 +1,7 @@
 """Missions of a level flown side by side: what a policy scores, in the time of a few."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.entities.state import LANDED, LOST
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.api.forms import shown
+from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.report import COVERED, ENERGY, FIRST_TERM, STATUS
 from uas_coverage_env.env.versions import Version
 from uas_coverage_env.flight.metrics import covered_share, share_of_available
@@ -33,6 +34,15 @@ class BatchedPolicy(NamedTuple):
     swarm_of: int | None
     version: Version
     chosen: Mapping[str, Any]
+
+    @classmethod
+    def of(
+        cls, policy: BatchPolicy, keywords: Mapping[str, Any], swarm_of: int | None = None
+    ) -> Self:
+        """One that was learned in the environments of these keyword arguments."""
+        names = ("action", "observation", "mask_in_observation", "images_apart")
+        chosen = {name: keywords[name] for name in names if name in keywords}
+        return cls(policy, swarm_of, MissionSettings.of(keywords).version, chosen)
 
 
 def flown_in_batches(

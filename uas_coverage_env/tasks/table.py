@@ -17,7 +17,7 @@ def cells(scores: Mapping[str, Score]) -> list[tuple[str, ...]]:
     return [
         (
             planner,
-            _shown(score.score),
+            shown(score.score),
             f"{score.mean('value'):.3f}",
             f"{100.0 * score.mean('coverage'):.1f}",
             _missing(score),
@@ -40,7 +40,8 @@ def _missing(score: Score) -> str:
     return f"{away} of {sum(mission.n_uas for mission in score.missions)}"
 
 
-def _shown(estimate: Estimate) -> str:
+def shown(estimate: Estimate) -> str:
+    """A score with its interval, where there is one."""
     if estimate.value is None:
         return "-"
     if estimate.low is None or estimate.high is None:

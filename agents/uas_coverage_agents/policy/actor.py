@@ -28,8 +28,6 @@ FAR_M = 200.0
 NEARLY_STRAIGHT = 0.999
 """A slope of 1, with which numbers of an action are velocities themselves, is taken for this."""
 
-AT_FIRST = (0.8, 0.5)
-
 OF_WAYPOINTS = ("waypoints", "ways")
 """Blocks of which each row is about a waypoint, in the same order."""
 
@@ -71,11 +69,11 @@ class Candidates(StrictModel):
 
 
 class Pointing(StrictModel):
-    """Actions that are velocities: along the first leg to a candidate, or home, or anywhere.
+    """Actions that are velocities: towards a candidate, or home, or anywhere, by a mixture.
 
-    For each of these there is a score, a speed along its leg and what else the action has (a
-    height); all of it is an action, in the environment's numbers, once the rest is added, which is
-    the same for all. Anywhere has no leg: it is the rest alone.
+    For each of these there is a score, and a mean action: the way to it (its first leg past
+    obstacles), shortened to each of `REACHES_M`, times a speed for each; a height, and one more
+    within the first of the reaches. Added to all is the rest, which alone is anywhere.
 
     Attributes:
         home: Direction (north, east) of the first leg home.
@@ -187,7 +185,7 @@ class Actor(StrictModel):
         if choices and slope is not None:
             home = table["home"][0]["direction"]
             pointing = Pointing(home=home, slope=min(slope, NEARLY_STRAIGHT))
-            others = 2 * outputs + 2
+            others = 3 * outputs
         return cls(
             inputs=sum(block.size for block in blocks),
             columns=tuple(of_all.columns),
@@ -207,8 +205,13 @@ class Actor(StrictModel):
     def outputs(self) -> int:
         """Choices that it scores, or numbers of an action."""
         if self.pointing:
-            return self.others // 2 - 1
+            return self.others // 3
         return self.others + (len(self.candidates.columns) if self.candidates else 0)
+
+    @property
+    def per_candidate(self) -> int:
+        """Numbers that the scorer gives: a score; with `pointing` speeds and heights, too."""
+        return 2 * self.outputs - 1 if self.pointing else 1
 
     @property
     def features(self) -> int:
@@ -225,12 +228,13 @@ class Actor(StrictModel):
         shapes |= {"others.weight": (self.others, last + self.features)}
         shapes |= {"others.bias": (self.others,)}
         if each := self.candidates:
-            per_each = self.outputs + 1 if self.pointing else 1
             parts = {
                 **{name: (each.inputs,) for name in _STANDARD},
                 "one.weight": (each.width, each.inputs), "one.bias": (each.width,),
-                "all.weight": (each.width, last), "score.weight": (per_each, each.width),
+                "all.weight": (each.width, last), "score.weight": (self.per_candidate, each.width),
             }  # fmt: skip
+            if self.pointing:
+                parts["score.bias"] = (self.per_candidate,)
             shapes |= {_EACH + name: shape for name, shape in parts.items()}
         return shapes
 
@@ -285,41 +289,41 @@ class Actor(StrictModel):
         scored = np.tanh(both) @ of["score.weight"].T
         if self.pointing is None:
             return np.concatenate([scored[..., 0], others], axis=-1)
+        scored = scored + of["score.bias"]
         return self.pointed(np, scored, others, self.read(inputs), self.read_of_each(inputs))
 
     def pointed(self, maths: Any, scored: Any, others: Any, read: Any, each: Any) -> Any:
-        """Scores and actions of all components, in NumPy or torch.
+        """Scores and mean actions of all components, in NumPy or torch.
 
         Args:
             maths: Either of them.
-            scored: (..., candidates, numbers) what the scorer gives.
-            others: (..., 2 numbers + 1) the same of home, the score of anywhere, and the rest.
+            scored: (..., candidates, per_candidate) what the scorer gives.
+            others: (..., 3 numbers): the same of home, the score of anywhere, and the rest.
             read: See `read`.
             each: See `read_of_each`; of a candidate that is not there all columns are 0.
 
         Returns:
             (..., candidates + 2, 1 + numbers).
         """
-        assert self.candidates is not None and self.pointing is not None
-        n, slope, columns = self.outputs, self.pointing.slope, self.candidates.columns[0]
-        named = maths.concatenate([scored, others[..., None, : n + 1]], -2)
+        assert self.candidates is not None
+        assert self.pointing is not None
+        m, slope, columns = self.per_candidate, self.pointing.slope, self.candidates.columns[0]
+        named = maths.concatenate([scored, others[..., None, :m]], -2)
         to_each = each[..., [columns.index(column) for column in self.candidates.vectors[0][:2]]]
-        level = 0.0
+        level, within = 0.0, []
         for k, reach_m in enumerate(REACHES_M):
             shares = maths.clip(FAR_M / reach_m * each[..., -2:-1], 0.0, 1.0)
-            home = read[..., None, self._home_within(k)]
-            gain = finely(maths.tanh(named[..., k + 1 : k + 2] + AT_FIRST[k]), slope)
-            level = level + gain * maths.concatenate([shares * to_each, home], -2)
-        along = on_straight_line(maths, level, slope)
-        above = named[..., len(REACHES_M) + 1 :]
-        low = maths.concatenate([0.0 * above[..., :-1, :], 0.0 * above[..., -1:, :] - 1.2], -2)
-        along = maths.concatenate([along, above + low], -1)
-        anywhere = 0.0 * along[..., :1, :]
-        actions = maths.concatenate([along, anywhere], -2) + others[..., None, n + 2 :]
+            way = maths.concatenate([shares * to_each, read[..., None, self._home_within(k)]], -2)
+            level = level + finely(maths.tanh(named[..., k + 1 : k + 2]), slope) * way
+            within.append(1.0 - (way * way).sum(-1)[..., None] ** 0.5)
+        heights = named[..., 3 : 3 + (m - 3) // 2] + within[0] * named[..., 3 + (m - 3) // 2 :]
+        towards = maths.concatenate([on_straight_line(maths, level, slope), heights], -1)
+        anywhere = 0.0 * towards[..., :1, :]
+        means = maths.concatenate([towards, anywhere], -2) + others[..., None, m + 1 :]
         there = (each[..., : len(columns)] != 0.0).any(-1)
         scores = maths.where(there, scored[..., 0], _NEVER)
-        scores = maths.concatenate([scores, others[..., [0, n + 1]] - 1.0], -1)
-        return maths.concatenate([scores[..., None], actions], -1)
+        scores = maths.concatenate([scores, others[..., [0, m]]], -1)
+        return maths.concatenate([scores[..., None], means], -1)
 
     def _home_within(self, k: int) -> list[int]:
         """Where `read` has the way home, shortened to a reach."""

@@ -1,4 +1,4 @@
-"""What a policy that is learned does by chance: which choice, which action, and how likely it was."""
+"""What a learner does by chance: which choice, which action, and how likely it was."""
 
 import torch
 from torch import Tensor

@@ -34,6 +34,7 @@ from uas_coverage_env.env import K_WAYPOINTS, CoverageBatch, MissionSettings
 from uas_coverage_env.env.report import STATUS
 from uas_coverage_env.files.strict_toml import InputError, StrictModel
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.tasks.lessons import LESSONS
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -47,22 +48,41 @@ class Phase(StrictModel):
     """What holds from some step on; a round has the phase in which it begins.
 
     Attributes:
-        begins: At how many steps.
+        begins: At which share of all steps.
         reward_weights: Instead of those of the environment.
         learning_rate: Of Adam.
         ent_coef: Weight of the entropy of the choices.
         noise: Standard deviation of actions that are numbers, at its begin and its end; between
             them it falls exponentially.
-        lesson: Fields of the scenarios that are other than in the missions, such as
-            `landing_distance_m`.
+        lessons: Lessons of levels (`uas_coverage_env.tasks.LESSONS`), and which share of the
+            missions is easier by each; the rest are as they are.
     """
 
-    begins: Annotated[int, Field(ge=0)] = 0
+    begins: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     reward_weights: dict[str, float] = Field(default_factory=dict)
     learning_rate: Positive = 7e-4
     ent_coef: NotNegative = 0.0
     noise: tuple[Positive, Positive] = (0.4, 0.4)
-    lesson: dict[str, float] = Field(default_factory=dict)
+    lessons: dict[str, Share] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _are_lessons(self) -> Self:
+        for name in self.lessons:
+            if name not in LESSONS or LESSONS[name].of is None:
+                known = ", ".join(each for each, lesson in LESSONS.items() if lesson.of)
+                raise ValueError(f"lessons: {name!r} is none that changes missions: {known}")
+        if sum(self.lessons.values()) > 1.0:
+            raise ValueError(f"lessons: shares of {sum(self.lessons.values()):g}; give at most 1")
+        return self
+
+    def taught(self, missions: Sequence[Scenario]) -> list[Scenario]:
+        """The missions, of which shares are those of the lessons."""
+        taught, first = list(missions), 0
+        for name, share in self.lessons.items():
+            last = first + round(share * len(taught))
+            taught[first:last] = map(LESSONS[name].of, taught[first:last])
+            first = last
+        return taught
 
 
 class PackedSettings(StrictModel):
@@ -161,7 +181,7 @@ class PackedPpo:
         if self._steps >= wanted:
             return
         begins = [phase.begins for phase in self._own.phases]
-        phase = self._own.phases[bisect_right(begins, self._steps) - 1]
+        phase = self._own.phases[bisect_right(begins, self._share) - 1]
         flown = _Flown(self._batch(phase, number), self._own)
         while self._steps < wanted:
             noise = self._noise(phase)
@@ -205,8 +225,6 @@ class PackedPpo:
         )
 
     def _check(self, phase: Phase) -> None:
-        if strange := phase.lesson.keys() - Scenario.model_fields.keys():
-            raise InputError(f"[learning] phases: lesson: a scenario has no {min(strange)!r}")
         try:
             MissionSettings.of(self._paid(phase))
         except ValueError as error:
@@ -221,21 +239,22 @@ class PackedPpo:
         """New missions for a round."""
         first = (self._seed // SEEDS_APART * self._settings.rounds + number) * self._own.missions
         drawn = [self._missions.mission(first + k) for k in range(self._own.missions)]
-        taught = [
-            each.model_copy(update=phase.lesson)
-            for each in {id(one): one for one in drawn}.values()
-        ]
+        taught = phase.taught(list({id(each): each for each in drawn}.values()))
         batch = CoverageBatch(
             self._settings.num_envs, taught, autoreset="same_step", **self._paid(phase)
         )
         batch.reset(self._seed * self._settings.num_envs)
         return batch
 
+    @property
+    def _share(self) -> float:
+        return self._steps / self._settings.total_timesteps
+
     def _noise(self, phase: Phase) -> float:
         """Of actions that are numbers, now."""
         later = [p.begins for p in self._own.phases if p.begins > phase.begins]
-        end = later[0] if later else self._settings.total_timesteps
-        share = min(max((self._steps - phase.begins) / max(end - phase.begins, 1), 0.0), 1.0)
+        past = (self._share - phase.begins) / (min(later, default=1.0) - phase.begins)
+        share = min(max(past, 0.0), 1.0)
         return float(phase.noise[0] ** (1.0 - share) * phase.noise[1] ** share)
 
     def _learn_from(self, rows: "Rows", phase: Phase, noise: float) -> float:

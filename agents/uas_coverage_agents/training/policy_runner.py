@@ -70,10 +70,7 @@ class EnvironmentRunner:
         remembers = hasattr(getattr(self.model, "policy", None), "lstm_actor")
         if not isinstance(self.model, BaseAlgorithm) or remembers:
             return None
-        version = MissionSettings.of(self._keywords).version
-        names = ("action", "observation", "mask_in_observation", "images_apart")
-        chosen = {name: self._keywords[name] for name in names if name in self._keywords}
-        return BatchedPolicy(self._actions, self._swarm_of, version, chosen)
+        return BatchedPolicy.of(self._actions, self._keywords, self._swarm_of)
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what it sees and does."""

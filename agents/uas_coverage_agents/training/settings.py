@@ -118,7 +118,8 @@ def settings_of(
         name: One of `learner_names()`, the path of a TOML file, or MODULE:CLASS, which is trained
             with the defaults.
         scenario: Another one than the settings say.
-        changes: `key=value` pairs, the key as in `learning.gamma`, the value as in TOML.
+        changes: `key=value` pairs, the key as in `learning.gamma`, or `learning.phases.0.noise` and
+            `learning.phases.*.noise` in a list of tables; the value as in TOML.
 
     Raises:
         InputError: There is none such, or something in it is wrong; one line.
@@ -166,11 +167,24 @@ def _set(data: dict[str, Any], change: str) -> None:
     except (tomllib.TOMLDecodeError, RecursionError):
         value = text  # a plain word is text
     *tables, last = key.split(".")
+    places: list[Any] = [data]
     for name in tables:
-        data = data.setdefault(name, {})
-        if not isinstance(data, dict):
+        places = [each for place in places for each in _inside(place, name)]
+        if not all(isinstance(place, dict | list) for place in places):
             raise InputError(f"--set {change!r}: there is no table {name!r}")
-    data[last] = value
+    for place in places:
+        if isinstance(place, list):
+            raise InputError(f"--set {change!r}: {tables[-1]} is a list; give it as a whole")
+        place[last] = value
+
+
+def _inside(place: Any, name: str) -> list[Any]:
+    """What a key names in a table; in a list of tables, the number of one of them, or `*`: all."""
+    if not isinstance(place, list):
+        return [place.setdefault(name, {})]
+    if name == "*":
+        return place
+    return [place[int(name)]] if name.isdecimal() and int(name) < len(place) else [None]
 
 
 def own_settings(settings: LearnerSettings, model: type[M], reads: Collection[str] = ()) -> M:

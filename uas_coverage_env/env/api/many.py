@@ -1,6 +1,6 @@
 """The short way to many missions at once, on the processor or on a GPU."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
@@ -51,7 +51,7 @@ def vector_env(
     device: Literal["cpu", "cuda"] = "cpu",
     **settings: Unpack[MissionKeywords],
 ) -> "CoverageVectorEnv | CudaMissions":
-    """Many missions at once; the same as `gymnasium.make_vec("UASCoverage-v0", num_envs)`.
+    """Many missions at once; what `gymnasium.make_vec` makes of the id of the version.
 
     Args:
         num_envs: How many.
@@ -91,15 +91,16 @@ def vector_env(
         "autoreset_mode": autoreset_mode, "threads": threads, "render_mode": render_mode,
         "copy": copy, **settings,
     }  # fmt: skip
-    return many_of(CoverageVectorEnv, num_envs, scenario, device, given)
+    return many_of(CoverageVectorEnv, num_envs, scenario, device=device, **given)
 
 
 def many_of(
     kind: type[CoverageVectorEnv],
-    num_envs: int,
-    scenario: ScenarioLike | Sequence[str | Path | Scenario],
-    device: str,
-    given: Mapping[str, Any],
+    num_envs: int = 1,
+    scenario: ScenarioLike | Sequence[str | Path | Scenario] = "village",
+    *,
+    device: str = "cpu",
+    **given: Any,
 ) -> "CoverageVectorEnv | CudaMissions":
     """Many missions at once, of the version of a class; see `vector_env`."""
     if device == "cuda":

@@ -1,5 +1,6 @@
 """How missions are flown and paid: what every environment can be told, in one record."""
 
+import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -231,3 +232,9 @@ def takes_settings(function: F) -> F:
     shown: Any = function
     shown.__signature__ = signature.replace(parameters=[*own, *named])
     return function
+
+
+def described_as(function: F) -> Callable[[Any], F]:
+    """Give a function the signature and the words of the same one in another version."""
+    described: Any = functools.wraps(function, assigned=("__doc__",))
+    return described
