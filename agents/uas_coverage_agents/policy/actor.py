@@ -20,6 +20,9 @@ SHARPENED = ("energy_margin", "below")
 OF_FLYING = ("clearance", "fence")
 """Likewise, where actions are velocities."""
 
+NEARLY_ONE = ("rays",)
+"""Then, features of which values near 1 matter: that from 1 is read, times `GAIN`."""
+
 GAIN = 6.0
 REACHES_M = (10.0, 60.0)
 FAR_M = 200.0
@@ -97,6 +100,7 @@ class Actor(StrictModel):
         inputs: Numbers of the observation of one UAS.
         columns: Of these, those that are read as they are.
         sharp: Those that are read times `GAIN`, within ±1, too.
+        ones: Those of which the distance from 1 is read times `GAIN`, within ±1, too.
         vectors: Direction (north, east) and closeness, which are read as vectors, too: each
             shortened to `REACHES_M`, and in units of it.
         velocity: Where its velocity north and east is.
@@ -114,6 +118,7 @@ class Actor(StrictModel):
     inputs: Width
     columns: _Columns
     sharp: _Columns
+    ones: _Columns = ()
     vectors: _Vectors
     velocity: tuple[_Column, _Column]
     hidden: Annotated[tuple[Width, ...], Field(min_length=1, max_length=8)]
@@ -127,7 +132,7 @@ class Actor(StrictModel):
     @model_validator(mode="after")
     def _reads_what_is_there(self) -> Self:
         each = self.candidates
-        rows = [*self.vectors, self.columns, self.sharp, self.velocity]
+        rows = [*self.vectors, self.columns, self.sharp, self.ones, self.velocity]
         rows += [*each.columns, *each.sharp, *each.vectors] if each else []
         rows += [self.pointing.home] if self.pointing else []
         last = max((column for row in rows for column in row), default=0)
@@ -172,6 +177,13 @@ class Actor(StrictModel):
             if name in OF_WAYPOINTS and len(rows_of) >= choices:
                 for read, row in zip(of_each, rows_of, strict=False):
                     read.add(row)
+        rows_of_all = [row for rows_of in table.values() for row in rows_of]
+        ones = [
+            column
+            for name in (NEARLY_ONE if slope is not None else ())
+            for row in rows_of_all
+            for column in row.get(name, ())
+        ]
         north, east, *_ = table["own"][0]["velocity"]
         each = None
         if choices:
@@ -190,6 +202,7 @@ class Actor(StrictModel):
             inputs=sum(block.size for block in blocks),
             columns=tuple(of_all.columns),
             sharp=tuple(of_all.sharp),
+            ones=tuple(ones),
             vectors=tuple(of_all.vectors),
             velocity=(north, east),
             hidden=hidden,
@@ -216,7 +229,12 @@ class Actor(StrictModel):
     @property
     def features(self) -> int:
         """Numbers that the layers read."""
-        return len(self.columns) + len(self.sharp) + 2 * len(REACHES_M) * len(self.vectors)
+        return self._plain + 2 * len(REACHES_M) * len(self.vectors)
+
+    @property
+    def _plain(self) -> int:
+        """Those before the vectors."""
+        return len(self.columns) + len(self.sharp) + len(self.ones)
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Name -> shape of every tensor."""
@@ -241,6 +259,8 @@ class Actor(StrictModel):
     def read(self, inputs: NDArray[np.floating]) -> NDArray[Any]:
         """What the layers read: (..., inputs) -> (..., features)."""
         parts = [inputs[..., self.columns], np.clip(GAIN * inputs[..., self.sharp], -1.0, 1.0)]
+        if self.ones:
+            parts.append(np.clip(GAIN * (inputs[..., self.ones] - 1.0), -1.0, 1.0))
         if self.vectors:
             north, east, closeness = np.array(self.vectors).T
             distance_m = self._distance(inputs[..., closeness])
@@ -329,7 +349,7 @@ class Actor(StrictModel):
         """Where `read` has the way home, shortened to a reach."""
         assert self.pointing is not None
         at = [vector[:2] for vector in self.vectors].index(self.pointing.home)
-        first, n = len(self.columns) + len(self.sharp), len(self.vectors)
+        first, n = self._plain, len(self.vectors)
         return [first + 2 * k * n + at, first + (2 * k + 1) * n + at]
 
     def _distance(self, closeness: NDArray[np.floating]) -> NDArray[Any]:
