@@ -143,6 +143,20 @@ def test_torch_and_numpy_give_the_same_scores_and_means(numbers, slope):
     assert (found[20:, :CANDIDATES, 0] > -1e8).all()
 
 
+def test_what_is_near_to_hit_is_read_finely_too():
+    network, seen = actor(), scene([])
+    first = len(network.columns) + len(network.sharp)
+    seen[columns("surroundings", "rays")[0]] = 1.0 - np.arange(10) / 20.0
+    finest = network.read(seen)[first : first + 10]
+    np.testing.assert_allclose(finest, np.maximum(-0.3 * np.arange(10), -1.0))
+    seen[columns("surroundings", "clearance")[0]] = 0.1
+    assert 0.6 in network.read(seen)[len(network.columns) : first].round(9)
+    chooses = Actor.of(
+        BLOCKS, 12, 15, hidden=(4,), width=4, rows=3, temperature=0.0, environment={}
+    )
+    assert chooses.ones == ()
+
+
 def test_numbers_and_shares_of_the_limit_are_those_of_the_action():
     shares = np.linspace(-1.0, 1.0, 9)
     found = on_straight_line(np, shares, SLOPE_AT_REST)
