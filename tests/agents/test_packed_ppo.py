@@ -212,7 +212,7 @@ def test_noise_falls_from_the_begin_of_a_phase_to_its_end():
 
 def test_a_phase_pays_by_its_own_weights_and_lessons_are_as_many_missions_as_it_says():
     phases = """[
-        {reward_weights={home=1.0}, lessons={landing=0.25, near=0.5}},
+        {reward_weights={home=1.0}, lessons={landing=1.0}},
         {begins=0.5, reward_weights={home=7.0}},
     ]"""
     learner = made(tiny("ppo-waypoint", f"learning.phases={phases}", "learning.missions=8"))
@@ -220,7 +220,7 @@ def test_a_phase_pays_by_its_own_weights_and_lessons_are_as_many_missions_as_it_
     at = first.settings.term_names.index("home")
     assert [first.settings.weights[at], second.settings.weights[at]] == [1.0, 7.0]
     missions = [learner._missions.mission(k) for k in range(8)]
-    taught = learner._own.phases[0].taught(missions)
+    taught = packed.Phase(lessons={"landing": 0.25, "near": 0.5}).taught(missions)
     wide = [each.landing_distance_m > 2.0 for each in taught]
     near = [len(each.waypoints) == len(each.uas) for each in taught]
     assert wide == [True] * 2 + [False] * 6
