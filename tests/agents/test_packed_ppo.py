@@ -7,7 +7,7 @@ import pytest
 import torch
 from uas_coverage_agents.policy.actor import Actor
 from uas_coverage_agents.policy.environment import action_of, keywords_of
-from uas_coverage_agents.training import packed
+from uas_coverage_agents.training import draws, packed
 from uas_coverage_agents.training.learner import Told
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.packed import PackedPpo, advantages_of
@@ -129,7 +129,7 @@ def test_a_masked_choice_is_never_taken_neither_in_flight_nor_with_noise():
     with torch.no_grad():
         outputs = learner._model.outputs(*learner._model.read(seen))
         for _ in range(50):
-            drawn, likely = packed._drawn(outputs, torch.from_numpy(masks), 1.0)
+            drawn, likely = draws.drawn(outputs, torch.from_numpy(masks), 1.0)
             assert masks[rows, drawn.numpy()].all()
             assert torch.isfinite(likely).all()
 
@@ -210,16 +210,23 @@ def test_noise_falls_from_the_begin_of_a_phase_to_its_end():
     assert found == pytest.approx([0.4, 0.2, 0.1, 0.1, 0.05])
 
 
-def test_a_phase_pays_by_its_own_weights_in_missions_of_its_lesson():
+def test_a_phase_pays_by_its_own_weights_and_lessons_are_as_many_missions_as_it_says():
     phases = """[
-        {reward_weights={home=1.0}, lesson={landing_distance_m=4.0}},
+        {reward_weights={home=1.0}, lessons={landing=1.0}},
         {begins=0.5, reward_weights={home=7.0}},
     ]"""
-    learner = made(tiny("ppo-waypoint", f"learning.phases={phases}"))
+    learner = made(tiny("ppo-waypoint", f"learning.phases={phases}", "learning.missions=8"))
     first, second = (learner._batch(phase, 0) for phase in learner._own.phases)
     at = first.settings.term_names.index("home")
     assert [first.settings.weights[at], second.settings.weights[at]] == [1.0, 7.0]
-    assert [one.scenario_of(0).landing_distance_m for one in (first, second)] == [4.0, 2.0]
+    missions = [learner._missions.mission(k) for k in range(8)]
+    taught = packed.Phase(lessons={"landing": 0.25, "near": 0.5}).taught(missions)
+    wide = [each.landing_distance_m > 2.0 for each in taught]
+    near = [len(each.waypoints) == len(each.uas) for each in taught]
+    assert wide == [True] * 2 + [False] * 6
+    assert near == [False] * 2 + [True] * 4 + [False] * 2
+    assert taught[6:] == missions[6:]
+    assert first.scenario_of(0).landing_distance_m > second.scenario_of(0).landing_distance_m
 
 
 @pytest.mark.parametrize(
@@ -228,7 +235,9 @@ def test_a_phase_pays_by_its_own_weights_in_missions_of_its_lesson():
         ("phases=[{begins=0.5}]", "give 0 first"),
         ("phases=[{begins=0.0},{begins=3000.0}]", "less than 1"),
         ("phases=[{reward_weights={homme=1.0}}]", "homme"),
-        ("phases=[{lesson={tolerance=1.0}}]", "tolerance"),
+        ("phases=[{lessons={flying=1.0}}]", "'flying' is none that changes missions"),
+        ("phases=[{lessons={assisted=1.0}}]", "'assisted' is none that changes missions"),
+        ("phases=[{lessons={few=0.6, near=0.5}}]", "shares of 1.1"),
         ("gamma=1.5", "gamma"),
     ],
 )

@@ -33,6 +33,7 @@ def flown(policy, level):
     [
         ("landing", stays_with_noise, "home", 1),
         ("few", nearest, "steps", -1),
+        ("near", nearest, "steps", -1),
         ("charged", nearest, "home", 1),
         ("assisted", stays_with_noise, "lost", -1),
     ],
@@ -60,6 +61,21 @@ def test_lessons_add_up_and_leave_the_rest_of_a_mission_as_it_is():
         same = {"waypoints", "landing_distance_m", "landing_speed_mps"}
         assert easier.model_dump(exclude=same) == mission.model_dump(exclude=same)
     assert level_named("hard").scenario(seed) == mission
+
+
+def test_near_leaves_a_waypoint_for_each_uas_and_none_that_is_left_out_is_nearer():
+    for seed, easier in level_named("hard:near").scenarios("training", 3).items():
+        mission = level_named("hard").scenario(seed)
+        starts_m = np.array([uas.start_m for uas in mission.uas])
+
+        def away_m(waypoint, starts_m=starts_m):
+            return np.linalg.norm(starts_m - waypoint.position_m, axis=1).min()
+
+        kept = [waypoint for waypoint in mission.waypoints if waypoint in easier.waypoints]
+        assert tuple(kept) == easier.waypoints
+        assert len(kept) == len(mission.uas)
+        others = [each for each in mission.waypoints if each not in kept]
+        assert max(map(away_m, kept)) <= min(map(away_m, others))
 
 
 def test_one_of_ones_own_is_one_entry_more(monkeypatch):

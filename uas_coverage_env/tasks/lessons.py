@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from uas_coverage_env.scenario import Scenario
 
 
@@ -43,6 +45,15 @@ def few_waypoints(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"waypoints": kept})
 
 
+def nearest_waypoints(scenario: Scenario) -> Scenario:
+    """The mission with a waypoint for each UAS, those nearest to the starts: soon all come home."""
+    places_m = np.array([waypoint.position_m for waypoint in scenario.waypoints])
+    starts_m = np.array([uas.start_m for uas in scenario.uas])
+    away_m = np.linalg.norm(places_m[:, np.newaxis] - starts_m, axis=2).min(axis=1)
+    nearest = np.sort(np.argsort(away_m, kind="stable")[: len(starts_m)])
+    return scenario.model_copy(update={"waypoints": tuple(scenario.waypoints[k] for k in nearest)})
+
+
 def full_batteries(scenario: Scenario) -> Scenario:
     """The mission with every battery full at its beginning."""
     fleet = tuple(uas.model_copy(update={"soc_0": 1.0}) for uas in scenario.uas)
@@ -55,6 +66,7 @@ LESSONS: dict[str, Lesson] = {
         wide_landing,
     ),
     "few": Lesson(f"{FEW} waypoints for each UAS", few_waypoints),
+    "near": Lesson("a waypoint for each UAS, those nearest to the starts", nearest_waypoints),
     "charged": Lesson("every battery is full at the beginning", full_batteries),
     "assisted": Lesson(
         "return mode and safety filter are on", task={"return_mode": True, "safety_filter": True}

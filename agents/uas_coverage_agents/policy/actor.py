@@ -17,10 +17,19 @@ from uas_coverage_env.files.strict_toml import StrictModel
 SHARPENED = ("energy_margin", "below")
 """Features of which small values matter: they are read a second time, times `GAIN`."""
 
+OF_FLYING = ("clearance", "fence")
+"""Likewise, where actions are velocities."""
+
+NEARLY_ONE = ("rays",)
+"""Then, features of which values near 1 matter: that from 1 is read, times `GAIN`."""
+
 GAIN = 6.0
 REACHES_M = (10.0, 60.0)
 FAR_M = 200.0
 """Distances are read up to here [m]."""
+
+NEARLY_STRAIGHT = 0.999
+"""A slope of 1, with which numbers of an action are velocities themselves, is taken for this."""
 
 OF_WAYPOINTS = ("waypoints", "ways")
 """Blocks of which each row is about a waypoint, in the same order."""
@@ -28,6 +37,7 @@ OF_WAYPOINTS = ("waypoints", "ways")
 _Column = Annotated[int, Field(ge=0, le=100_000)]
 _Columns = Annotated[tuple[_Column, ...], Field(max_length=10_000)]
 _Vectors = Annotated[tuple[tuple[_Column, _Column, _Column], ...], Field(max_length=1000)]
+_NEVER = -1e9
 _EACH = "candidates."
 _STANDARD = "offset", "scale"
 
@@ -61,6 +71,23 @@ class Candidates(StrictModel):
         return len(self.columns[0]) + len(self.sharp[0]) + 2
 
 
+class Pointing(StrictModel):
+    """Actions that are velocities: towards a candidate, or home, or anywhere, by a mixture.
+
+    For each of these there is a score, and a mean action: the way to it (its first leg past
+    obstacles), shortened to each of `REACHES_M`, times a speed for each; a height, and one more
+    within the first of the reaches. Added to all is the rest, which alone is anywhere.
+
+    Attributes:
+        home: Direction (north, east) of the first leg home.
+        slope: Of the action at rest: a number s of it is s · (slope + (1 - slope) · s²) of the
+            vehicle's limit. Speeds are such numbers, too, so that they are fine near rest.
+    """
+
+    home: tuple[_Column, _Column]
+    slope: Annotated[float, Field(gt=0.0, le=NEARLY_STRAIGHT)]
+
+
 class Actor(StrictModel):
     """Layers with tanh over features of the observation; then a score for each choice, or actions.
 
@@ -73,11 +100,13 @@ class Actor(StrictModel):
         inputs: Numbers of the observation of one UAS.
         columns: Of these, those that are read as they are.
         sharp: Those that are read times `GAIN`, within ±1, too.
+        ones: Those of which the distance from 1 is read times `GAIN`, within ±1, too.
         vectors: Direction (north, east) and closeness, which are read as vectors, too: each
             shortened to `REACHES_M`, and in units of it.
         velocity: Where its velocity north and east is.
         hidden: Widths of the layers.
         candidates: What there is to choose from; None: actions are no choices.
+        pointing: How candidates become velocities; None: they are choices.
         others: Outputs after the candidates.
         temperature: Choices are drawn with probabilities exp(score / this), as they were while it
             was learned; 0: the best one is taken. UAS that see the same and never draw collide.
@@ -89,10 +118,12 @@ class Actor(StrictModel):
     inputs: Width
     columns: _Columns
     sharp: _Columns
+    ones: _Columns = ()
     vectors: _Vectors
     velocity: tuple[_Column, _Column]
     hidden: Annotated[tuple[Width, ...], Field(min_length=1, max_length=8)]
     candidates: Candidates | None = None
+    pointing: Pointing | None = None
     others: Width
     temperature: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     nearby_m: Annotated[float, Field(gt=0.0)]
@@ -101,8 +132,9 @@ class Actor(StrictModel):
     @model_validator(mode="after")
     def _reads_what_is_there(self) -> Self:
         each = self.candidates
-        rows = [*self.vectors, self.columns, self.sharp, self.velocity]
+        rows = [*self.vectors, self.columns, self.sharp, self.ones, self.velocity]
         rows += [*each.columns, *each.sharp, *each.vectors] if each else []
+        rows += [self.pointing.home] if self.pointing else []
         last = max((column for row in rows for column in row), default=0)
         if last >= self.inputs:
             raise ValueError(f"column {last} is read, and there are {self.inputs}")
@@ -120,6 +152,7 @@ class Actor(StrictModel):
         rows: int,
         temperature: float,
         environment: dict[str, Any],
+        slope: float | None = None,
     ) -> "Actor":
         """The network for an observation.
 
@@ -133,15 +166,24 @@ class Actor(StrictModel):
             rows: How many waypoints the layers see.
             temperature: See `Actor`.
             environment: See `Actor`.
+            slope: Of velocities that candidates become, see `Pointing`; None: they do not.
         """
         table = _columns_of(blocks)
-        of_all, of_each = _Read(), [_Read() for _ in range(choices)]
+        sharp = SHARPENED if slope is None else (*SHARPENED, *OF_FLYING)
+        of_all, of_each = _Read(sharp), [_Read(sharp) for _ in range(choices)]
         for name, rows_of in table.items():
             for row in rows_of[:rows] if name in OF_WAYPOINTS else rows_of:
                 of_all.add(row)
             if name in OF_WAYPOINTS and len(rows_of) >= choices:
                 for read, row in zip(of_each, rows_of, strict=False):
                     read.add(row)
+        rows_of_all = [row for rows_of in table.values() for row in rows_of]
+        ones = [
+            column
+            for name in (NEARLY_ONE if slope is not None else ())
+            for row in rows_of_all
+            for column in row.get(name, ())
+        ]
         north, east, *_ = table["own"][0]["velocity"]
         each = None
         if choices:
@@ -151,15 +193,22 @@ class Actor(StrictModel):
                 vectors=tuple(one.vectors[-1] for one in of_each),
                 width=width,
             )
+        pointing, others = None, outputs - choices
+        if choices and slope is not None:
+            home = table["home"][0]["direction"]
+            pointing = Pointing(home=home, slope=min(slope, NEARLY_STRAIGHT))
+            others = 3 * outputs
         return cls(
             inputs=sum(block.size for block in blocks),
             columns=tuple(of_all.columns),
             sharp=tuple(of_all.sharp),
+            ones=tuple(ones),
             vectors=tuple(of_all.vectors),
             velocity=(north, east),
             hidden=hidden,
             candidates=each,
-            others=outputs - choices,
+            pointing=pointing,
+            others=others,
             temperature=temperature,
             nearby_m=NEARBY_M,
             environment=environment,
@@ -167,13 +216,25 @@ class Actor(StrictModel):
 
     @property
     def outputs(self) -> int:
-        """Numbers that it gives."""
+        """Choices that it scores, or numbers of an action."""
+        if self.pointing:
+            return self.others // 3
         return self.others + (len(self.candidates.columns) if self.candidates else 0)
+
+    @property
+    def per_candidate(self) -> int:
+        """Numbers that the scorer gives: a score; with `pointing` speeds and heights, too."""
+        return 2 * self.outputs - 1 if self.pointing else 1
 
     @property
     def features(self) -> int:
         """Numbers that the layers read."""
-        return len(self.columns) + len(self.sharp) + 2 * len(REACHES_M) * len(self.vectors)
+        return self._plain + 2 * len(REACHES_M) * len(self.vectors)
+
+    @property
+    def _plain(self) -> int:
+        """Those before the vectors."""
+        return len(self.columns) + len(self.sharp) + len(self.ones)
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Name -> shape of every tensor."""
@@ -188,14 +249,18 @@ class Actor(StrictModel):
             parts = {
                 **{name: (each.inputs,) for name in _STANDARD},
                 "one.weight": (each.width, each.inputs), "one.bias": (each.width,),
-                "all.weight": (each.width, last), "score.weight": (1, each.width),
+                "all.weight": (each.width, last), "score.weight": (self.per_candidate, each.width),
             }  # fmt: skip
+            if self.pointing:
+                parts["score.bias"] = (self.per_candidate,)
             shapes |= {_EACH + name: shape for name, shape in parts.items()}
         return shapes
 
     def read(self, inputs: NDArray[np.floating]) -> NDArray[Any]:
         """What the layers read: (..., inputs) -> (..., features)."""
         parts = [inputs[..., self.columns], np.clip(GAIN * inputs[..., self.sharp], -1.0, 1.0)]
+        if self.ones:
+            parts.append(np.clip(GAIN * (inputs[..., self.ones] - 1.0), -1.0, 1.0))
         if self.vectors:
             north, east, closeness = np.array(self.vectors).T
             distance_m = self._distance(inputs[..., closeness])
@@ -227,7 +292,8 @@ class Actor(StrictModel):
             inputs: (..., inputs).
 
         Returns:
-            (..., candidates + others).
+            (..., candidates + others); with `pointing` (..., components, 1 + numbers): the score
+            of each, and its action.
         """
         inputs = np.asarray(inputs, dtype=np.float64)
         x = seen = (self.read(inputs) - tensors["offset"]) * tensors["scale"]
@@ -240,12 +306,66 @@ class Actor(StrictModel):
         of = {name.removeprefix(_EACH): t for name, t in tensors.items() if name.startswith(_EACH)}
         one = (self.read_of_each(inputs) - of["offset"]) * of["scale"]
         both = one @ of["one.weight"].T + of["one.bias"] + (x @ of["all.weight"].T)[..., None, :]
-        scores = np.tanh(both) @ of["score.weight"][0]
-        return np.concatenate([scores, others], axis=-1)
+        scored = np.tanh(both) @ of["score.weight"].T
+        if self.pointing is None:
+            return np.concatenate([scored[..., 0], others], axis=-1)
+        scored = scored + of["score.bias"]
+        return self.pointed(np, scored, others, self.read(inputs), self.read_of_each(inputs))
+
+    def pointed(self, maths: Any, scored: Any, others: Any, read: Any, each: Any) -> Any:
+        """Scores and mean actions of all components, in NumPy or torch.
+
+        Args:
+            maths: Either of them.
+            scored: (..., candidates, per_candidate) what the scorer gives.
+            others: (..., 3 numbers): the same of home, the score of anywhere, and the rest.
+            read: See `read`.
+            each: See `read_of_each`; of a candidate that is not there all columns are 0.
+
+        Returns:
+            (..., candidates + 2, 1 + numbers).
+        """
+        assert self.candidates is not None
+        assert self.pointing is not None
+        m, slope, columns = self.per_candidate, self.pointing.slope, self.candidates.columns[0]
+        named = maths.concatenate([scored, others[..., None, :m]], -2)
+        to_each = each[..., [columns.index(column) for column in self.candidates.vectors[0][:2]]]
+        level, within = 0.0, []
+        for k, reach_m in enumerate(REACHES_M):
+            shares = maths.clip(FAR_M / reach_m * each[..., -2:-1], 0.0, 1.0)
+            way = maths.concatenate([shares * to_each, read[..., None, self._home_within(k)]], -2)
+            level = level + finely(maths.tanh(named[..., k + 1 : k + 2]), slope) * way
+            within.append(1.0 - (way * way).sum(-1)[..., None] ** 0.5)
+        heights = named[..., 3 : 3 + (m - 3) // 2] + within[0] * named[..., 3 + (m - 3) // 2 :]
+        towards = maths.concatenate([on_straight_line(maths, level, slope), heights], -1)
+        anywhere = 0.0 * towards[..., :1, :]
+        means = maths.concatenate([towards, anywhere], -2) + others[..., None, m + 1 :]
+        there = (each[..., : len(columns)] != 0.0).any(-1)
+        scores = maths.where(there, scored[..., 0], _NEVER)
+        scores = maths.concatenate([scores, others[..., [0, m]]], -1)
+        return maths.concatenate([scores[..., None], means], -1)
+
+    def _home_within(self, k: int) -> list[int]:
+        """Where `read` has the way home, shortened to a reach."""
+        assert self.pointing is not None
+        at = [vector[:2] for vector in self.vectors].index(self.pointing.home)
+        first, n = self._plain, len(self.vectors)
+        return [first + 2 * k * n + at, first + (2 * k + 1) * n + at]
 
     def _distance(self, closeness: NDArray[np.floating]) -> NDArray[Any]:
         nearest = self.nearby_m / (self.nearby_m + FAR_M)
         return self.nearby_m / np.maximum(closeness, nearest) - self.nearby_m
+
+
+def finely(number: Any, slope: float) -> Any:
+    """Share of the limit that a number of the velocity action is."""
+    return number * (slope + (1.0 - slope) * number * number)
+
+
+def on_straight_line(maths: Any, share: Any, slope: float) -> Any:
+    """The number that is this share of the limit: the one root of a cubic that rises everywhere."""
+    bend = (3.0 * (1.0 - slope) / slope) ** 0.5
+    return 2.0 / bend * maths.sinh(maths.asinh(1.5 / slope * bend * share) / 3.0)
 
 
 _Row = dict[str, tuple[int, ...]]
@@ -270,6 +390,7 @@ def _columns_of(blocks: Sequence[Group]) -> dict[str, list[_Row]]:
 class _Read:
     """Columns that are read, as in `Actor`."""
 
+    sharpened: tuple[str, ...]
     columns: list[int] = field(default_factory=list)
     sharp: list[int] = field(default_factory=list)
     vectors: list[Any] = field(default_factory=list)
@@ -277,6 +398,6 @@ class _Read:
     def add(self, row: _Row) -> None:
         """Read a row of a block."""
         self.columns += [column for columns in row.values() for column in columns]
-        self.sharp += [column for name in SHARPENED for column in row.get(name, ())]
+        self.sharp += [column for name in self.sharpened for column in row.get(name, ())]
         if "direction" in row:
             self.vectors.append((*row["direction"], *(row.get("leg") or row["closeness"])))

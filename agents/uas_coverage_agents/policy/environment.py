@@ -49,7 +49,8 @@ def keywords_of(policy: Policy) -> dict[str, Any]:
     if not policy.description.observation.has_the_numbers_of(observed(keywords)):
         raise ValueError("its observation is not that of this version; train it anew")
     wanted = settings.kind.choices or settings.kind.size
-    if network.outputs != wanted or (network.candidates and not settings.chooses):
+    chooses = network.candidates is not None and network.pointing is None
+    if network.outputs != wanted or (chooses and not settings.chooses):
         raise ValueError(f"network: {network.outputs} outputs for action {settings.kind.name!r}")
     return keywords
 
@@ -67,16 +68,25 @@ def action_of(policy: Policy) -> Callable[[Any], Any]:
     Raises:
         ValueError: See `keywords_of`.
     """
-    temperature = getattr(policy.description.network, "temperature", 0.0)
+    network = policy.description.network
+    temperature = getattr(network, "temperature", 0.0)
+
+    def drawn(scores: Any, observation: Any) -> Any:
+        if temperature == 0.0:
+            return scores
+        chance = _drawn_by(observation, scores.shape[-1])
+        return scores - temperature * np.log(-np.log(chance))  # Gumbel's distribution
 
     def actions(seen: Any) -> Any:
-        return np.clip(policy.forward(seen), -1.0, 1.0).astype(np.float32)
+        found = policy.forward(seen)
+        if getattr(network, "pointing", None):
+            which = drawn(found[..., 0], seen).argmax(axis=-1)
+            found = np.take_along_axis(found, which[..., None, None], -2)[..., 0, 1:]
+        return np.clip(found, -1.0, 1.0).astype(np.float32)
 
     def choices(seen: Any) -> Any:
-        scores = policy.forward(seen["observation"])
-        if temperature > 0.0:
-            drawn = _drawn_by(seen["observation"], scores.shape[-1])
-            scores = scores - temperature * np.log(-np.log(drawn))  # Gumbel's distribution
+        observation = seen["observation"]
+        scores = drawn(policy.forward(observation), observation)
         return np.where(seen["action_mask"], scores, -np.inf).argmax(axis=-1)
 
     return choices if keywords_of(policy).get("mask_in_observation") else actions

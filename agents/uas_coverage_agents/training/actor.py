@@ -16,6 +16,15 @@ _LEAST_SPREAD = 0.05
 _AT_FIRST = 0.1
 """The last layers begin with weights of this share: all choices are much alike."""
 
+_SPEEDS = (0.8, 0.5)
+"""Velocities begin with these, within each of `REACHES_M`: some 5 m/s, less from 10 m on."""
+
+_LOW = -1.5
+"""Home begins with this height near its end: so low that noise does not keep a UAS from landing."""
+
+_SELDOM = -2.0
+"""Scores of home, and of velocities to no place, begin with this; those of candidates with 0."""
+
 
 class ActorCritic(nn.Module):
     """What is learned.
@@ -41,7 +50,8 @@ class ActorCritic(nn.Module):
         if each := network.candidates:
             self.one = nn.Linear(each.inputs, each.width)
             self.all = nn.Linear(last, each.width, bias=False)
-            self.score = nn.Linear(each.width, 1, bias=False)
+            pointing = network.pointing is not None
+            self.score = nn.Linear(each.width, network.per_candidate, bias=pointing)
             small.append(self.score)
             self.register_buffer("each_offset", torch.zeros(each.inputs))
             self.register_buffer("each_scale", torch.ones(each.inputs))
@@ -50,6 +60,16 @@ class ActorCritic(nn.Module):
                 layer.weight.mul_(_AT_FIRST)
                 if layer.bias is not None:
                     layer.bias.zero_()
+            if network.pointing:
+                self._point_at_first(network.per_candidate)
+
+    def _point_at_first(self, m: int) -> None:
+        """Fly there at some speed; seldom home, and low when near; no other numbers are given."""
+        speeds = torch.tensor(_SPEEDS)
+        self.score.bias[1:3] = speeds
+        self.others.bias[1:3] = speeds
+        self.others.bias[0] = self.others.bias[m] = _SELDOM
+        self.others.bias[3 + (m - 3) // 2 : m] = _LOW
 
     def read(self, observed: NDArray[np.float32]) -> tuple[Tensor, Tensor | None]:
         """What a forward pass reads of the observations of some rows."""
@@ -64,10 +84,11 @@ class ActorCritic(nn.Module):
         Args:
             read: (N, features).
             each: (N, candidates, their inputs); None: there are none.
-            exists: (N, candidates) which of them are there.
+            exists: (N, candidates) which of them are there; None: those of which any is not 0.
         """
         _standardise(read, self.offset, self.scale)
         if each is not None:
+            exists = each[:, :, :-2].any(2) if exists is None else exists
             _standardise(each[exists], self.each_offset, self.each_scale)
 
     def outputs(self, read: Tensor, each: Tensor | None) -> Tensor:
@@ -78,8 +99,10 @@ class ActorCritic(nn.Module):
         if each is None:
             return others
         one = self.one((each - self.each_offset) * self.each_scale)
-        scores = self.score(torch.tanh(one + self.all(x)[:, None]))[:, :, 0]
-        return torch.cat([scores, others], 1)
+        scored = self.score(torch.tanh(one + self.all(x)[:, None]))
+        if self.network.pointing:
+            return self.network.pointed(torch, scored, others, read, each)
+        return torch.cat([scored[:, :, 0], others], 1)
 
     def values(self, read: Tensor) -> Tensor:
         """(N,) what the critic expects."""
@@ -96,6 +119,8 @@ class ActorCritic(nn.Module):
             parts = "one.weight", "one.bias", "all.weight", "score.weight"
             names |= {f"candidates.{part}": part for part in parts}
             names |= {f"candidates.{part}": f"each_{part}" for part in ("offset", "scale")}
+        if self.network.pointing is not None:
+            names["candidates.score.bias"] = "score.bias"
         return {name: own[found] for name, found in names.items()}
 
 

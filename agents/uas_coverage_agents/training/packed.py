@@ -24,6 +24,7 @@ from torch import Tensor, nn
 from uas_coverage_agents.policy.actor import Actor
 from uas_coverage_agents.policy.environment import observed, plain
 from uas_coverage_agents.training.actor import ActorCritic
+from uas_coverage_agents.training.draws import drawn, likely
 from uas_coverage_agents.training.learner import SEEDS_APART, Arrays, Learned, Told
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.settings import Count, LearnerSettings, own_settings
@@ -33,6 +34,7 @@ from uas_coverage_env.env import K_WAYPOINTS, CoverageBatch, MissionSettings
 from uas_coverage_env.env.report import STATUS
 from uas_coverage_env.files.strict_toml import InputError, StrictModel
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.tasks.lessons import LESSONS
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -52,8 +54,8 @@ class Phase(StrictModel):
         ent_coef: Weight of the entropy of the choices.
         noise: Standard deviation of actions that are numbers, at its begin and its end; between
             them it falls exponentially.
-        lesson: Fields of the scenarios that are other than in the missions, such as
-            `landing_distance_m`.
+        lessons: Lessons of levels (`uas_coverage_env.tasks.LESSONS`), and which share of the
+            missions is easier by each; the rest are as they are.
     """
 
     begins: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
@@ -61,7 +63,26 @@ class Phase(StrictModel):
     learning_rate: Positive = 7e-4
     ent_coef: NotNegative = 0.0
     noise: tuple[Positive, Positive] = (0.4, 0.4)
-    lesson: dict[str, float] = Field(default_factory=dict)
+    lessons: dict[str, Share] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _are_lessons(self) -> Self:
+        for name in self.lessons:
+            if name not in LESSONS or LESSONS[name].of is None:
+                known = ", ".join(each for each, lesson in LESSONS.items() if lesson.of)
+                raise ValueError(f"lessons: {name!r} is none that changes missions: {known}")
+        if sum(self.lessons.values()) > 1.0:
+            raise ValueError(f"lessons: shares of {sum(self.lessons.values()):g}; give at most 1")
+        return self
+
+    def taught(self, missions: Sequence[Scenario]) -> list[Scenario]:
+        """The missions, of which shares are those of the lessons."""
+        taught, first = list(missions), 0
+        for name, share in self.lessons.items():
+            last = first + round(share * len(taught))
+            taught[first:last] = map(LESSONS[name].of, taught[first:last])
+            first = last
+        return taught
 
 
 class PackedSettings(StrictModel):
@@ -132,15 +153,17 @@ class PackedPpo:
         for phase in self._own.phases:
             self._check(phase)
         rules = MissionSettings.of(self._keywords)
+        points = rules.kind.numbers[:2] == ("north_mps", "east_mps")
         self._network = Actor.of(
             rules.observation,
-            K_WAYPOINTS if rules.chooses and self._own.width else 0,
+            K_WAYPOINTS if (rules.chooses or points) and self._own.width else 0,
             rules.kind.choices or rules.kind.size,
             hidden=self._own.hidden,
             width=self._own.width,
             rows=self._own.rows,
-            temperature=self._own.temperature if rules.chooses else 0.0,
+            temperature=self._own.temperature if rules.chooses or points else 0.0,
             environment=plain(self._keywords),
+            slope=next(iter(rules.kind.parameters), 1.0) if points else None,
         )
         self._model = ActorCritic(self._network)
         self._optimiser = torch.optim.Adam(self._model.parameters(), eps=1e-5)
@@ -202,8 +225,6 @@ class PackedPpo:
         )
 
     def _check(self, phase: Phase) -> None:
-        if strange := phase.lesson.keys() - Scenario.model_fields.keys():
-            raise InputError(f"[learning] phases: lesson: a scenario has no {min(strange)!r}")
         try:
             MissionSettings.of(self._paid(phase))
         except ValueError as error:
@@ -218,10 +239,7 @@ class PackedPpo:
         """New missions for a round."""
         first = (self._seed // SEEDS_APART * self._settings.rounds + number) * self._own.missions
         drawn = [self._missions.mission(first + k) for k in range(self._own.missions)]
-        taught = [
-            each.model_copy(update=phase.lesson)
-            for each in {id(one): one for one in drawn}.values()
-        ]
+        taught = phase.taught(list({id(each): each for each in drawn}.values()))
         batch = CoverageBatch(
             self._settings.num_envs, taught, autoreset="same_step", **self._paid(phase)
         )
@@ -251,8 +269,8 @@ class PackedPpo:
                 each = None if rows.each is None else rows.each[some]
                 exists = None if rows.masks is None else rows.masks[some]
                 outputs = self._model.outputs(rows.read[some], each)
-                likely, entropy = _likely(outputs, rows.actions[some], exists, noise)
-                apart = likely - rows.likely[some]
+                chance, entropy = likely(outputs, rows.actions[some], exists, noise)
+                apart = chance - rows.likely[some]
                 ratio, better = apart.exp(), advantages[some]
                 within = ratio.clamp(1.0 - own.clip_range, 1.0 + own.clip_range)
                 errors = self._model.values(rows.read[some]) - rows.returns[some]
@@ -322,9 +340,9 @@ class _Flown:
             read, each = model.read(batch.observation[acts])
             masks = torch.from_numpy(batch.action_masks()[acts]) if batch.chooses else None
             with torch.no_grad():
-                actions, likely = _drawn(model.outputs(read, each), masks, noise)
+                actions, chance = drawn(model.outputs(read, each), masks, noise)
                 values[t][acts] = model.values(read).numpy()
-            kept.append((read, each, masks, actions, likely))
+            kept.append((read, each, masks, actions, chance))
             batch.step(_asked(batch, acts, actions))
             rewards[t] = self._own.reward_scale * batch.lanes.rewards
             ended[t] = self._end(acts)
@@ -333,10 +351,10 @@ class _Flown:
             values[steps][last] = model.values(model.read(batch.observation[last])[0]).numpy()
         own = self._own
         advantages = advantages_of(rewards, values, ended, own.gamma, own.gae_lambda)
-        read, each, masks, actions, likely = map(_joined, zip(*kept, strict=True))
+        read, each, masks, actions, chance = map(_joined, zip(*kept, strict=True))
         gained = torch.from_numpy(advantages[decided])
         returns = gained + torch.from_numpy(values[:-1][decided])
-        return Rows(read, each, masks, actions, likely, gained, returns)
+        return Rows(read, each, masks, actions, chance, gained, returns)
 
     def tell(self) -> dict[str, float]:
         """Of the UAS whose flights ended since the last time: how, with the noise of learning."""
@@ -387,31 +405,6 @@ def advantages_of(
 def _joined(parts: Sequence[Any]) -> Any:
     """Of all steps, one after the other; None where there are none."""
     return None if parts[0] is None else torch.cat(tuple(parts))
-
-
-def _drawn(outputs: Tensor, masks: Tensor | None, noise: float) -> tuple[Tensor, Tensor]:
-    """Actions, and the logarithms of their probabilities."""
-    if masks is None:
-        actions = outputs + noise * torch.randn_like(outputs)
-    else:
-        gumbel = -torch.log(-torch.log(torch.rand_like(outputs).clamp(1e-9, 1.0 - 1e-7)))
-        actions = (_masked(outputs, masks) + gumbel).argmax(1)
-    return actions, _likely(outputs, actions, masks, noise)[0]
-
-
-def _likely(
-    outputs: Tensor, actions: Tensor, masks: Tensor | None, noise: float
-) -> tuple[Tensor, Tensor]:
-    """(N,) logarithms of the probabilities of actions, and the mean entropy of choices."""
-    if masks is None:
-        return (-0.5 * ((actions - outputs) / noise) ** 2).sum(1), torch.zeros(())
-    logarithms = torch.log_softmax(_masked(outputs, masks), 1)
-    entropy = -(logarithms.exp() * logarithms.clamp(min=-30.0)).sum(1).mean()
-    return logarithms.gather(1, actions[:, None])[:, 0], entropy
-
-
-def _masked(outputs: Tensor, masks: Tensor) -> Tensor:
-    return outputs.masked_fill(~masks, -1e9)
 
 
 def _asked(batch: CoverageBatch, acts: NDArray[np.bool_], actions: Tensor) -> NDArray[Any]:
