@@ -155,6 +155,8 @@ def test_what_is_near_to_hit_is_read_finely_too():
         BLOCKS, 12, 15, hidden=(4,), width=4, rows=3, temperature=0.0, environment={}
     )
     assert chooses.ones == ()
+    assert network.velocity == tuple(columns("own", "velocity")[0, :2])
+    assert network.pointing.home == tuple(columns("home", "direction")[0])
 
 
 def test_numbers_and_shares_of_the_limit_are_those_of_the_action():

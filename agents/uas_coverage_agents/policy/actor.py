@@ -196,7 +196,7 @@ class Actor(StrictModel):
         pointing, others = None, outputs - choices
         if choices and slope is not None:
             home = table["home"][0]["direction"]
-            pointing = Pointing(home=home, slope=min(slope, NEARLY_STRAIGHT))
+            pointing = Pointing(home=(home[0], home[1]), slope=min(slope, NEARLY_STRAIGHT))
             others = 3 * outputs
         return cls(
             inputs=sum(block.size for block in blocks),

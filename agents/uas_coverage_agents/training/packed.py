@@ -80,7 +80,9 @@ class Phase(StrictModel):
         taught, first = list(missions), 0
         for name, share in self.lessons.items():
             last = first + round(share * len(taught))
-            taught[first:last] = map(LESSONS[name].of, taught[first:last])
+            easier = LESSONS[name].of
+            assert easier is not None
+            taught[first:last] = map(easier, taught[first:last])
             first = last
         return taught
 
