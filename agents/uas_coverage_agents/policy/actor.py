@@ -336,7 +336,9 @@ class Actor(StrictModel):
             way = maths.concatenate([shares * to_each, read[..., None, self._home_within(k)]], -2)
             level = level + finely(maths.tanh(named[..., k + 1 : k + 2]), slope) * way
             within.append(1.0 - (way * way).sum(-1)[..., None] ** 0.5)
-        heights = named[..., 3 : 3 + (m - 3) // 2] + within[0] * named[..., 3 + (m - 3) // 2 :]
+        first = 1 + len(REACHES_M)  # after the score and the speeds
+        near = first + (m - first) // 2
+        heights = named[..., first:near] + within[0] * named[..., near:]
         towards = maths.concatenate([on_straight_line(maths, level, slope), heights], -1)
         anywhere = 0.0 * towards[..., :1, :]
         means = maths.concatenate([towards, anywhere], -2) + others[..., None, m + 1 :]
