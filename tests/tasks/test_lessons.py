@@ -100,7 +100,7 @@ def test_a_lesson_travels_to_another_process():
     [
         (lambda: score(nearest, "hard:few", missions=1), "hard:few is a lesson"),
         (lambda: level_named("hard:few").missions("test"), "no test missions"),
-        (lambda: level_named("hard:fewer"), "one of landing, few, charged, assisted"),
+        (lambda: level_named("hard:fewer"), "one of landing, few, near, charged, assisted"),
         (lambda: level_named("hard:"), "lesson is ''"),
         (lambda: level_named("harder:few"), "level is 'harder'"),
     ],
