@@ -5,7 +5,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from toy_problems import BY_NODES, planned, two_around_a_tower
+from toy_problems import BY_NODES, planned
 from uas_coverage_baselines.milp_mpc.search import team_search
 from uas_coverage_baselines.milp_mpc.search.decision import decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
@@ -66,20 +66,3 @@ def test_as_many_uas_are_planned_for_as_the_work_suffices_for(problem, of_one, m
     first, then = (search.planned(turns, []) for _ in range(2))
     assert len(first) == len(then) == many
     assert set(first + then) == {0, 1}, "the other one is next"
-
-
-def test_the_joint_program_of_one_uas_gets_its_root_and_more_with_more_work(monkeypatch):
-    given = []
-    solved = team_search.TeamSearch._solved
-
-    def noted(search, program, limits, *start):
-        given.append(limits.nodes)
-        return solved(search, program, limits, *start)
-
-    monkeypatch.setattr(team_search.TeamSearch, "_solved", noted)
-    for work in (1.0, 10.0):
-        effort = dataclasses.replace(BY_NODES, work=work)
-        search = team_search.TeamSearch(two_around_a_tower(n_uas=1), effort, time.perf_counter())
-        search.prepare([0])
-        search.improve()
-    assert given == [1, 10]

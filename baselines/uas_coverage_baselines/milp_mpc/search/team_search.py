@@ -64,7 +64,7 @@ class Effort:
 _LATE = 0.15  # share of the time limit kept for verification and whatever is late
 _WORTH_STARTING_S = 0.05  # less time than this gives no plan
 _TEAMS_VERIFIED = 6
-_NODES = 60
+_NODES, _ALONE_NODES = 60, 30
 _JOINT_NODES = 1  # the root: its bound and what comes of the start
 _JOINT_SHARE = 0.6  # of the work: the most that is kept for the joint program
 _AT_LEAST, _AT_MOST = 1.1, 2.0  # of the work: with which it is solved, with which all ends
@@ -264,18 +264,20 @@ class TeamSearch:
         """The whole OCP from the best plan so far, with the work that is left.
 
         In the tightest form, since its bound is what is asked for, and the only one that a plan
-        gets; its root alone, since a node takes about as long.
+        gets; of several UAS the root.
         """
         if not self._joint or self.work + self._joint > _AT_LEAST * self.effort.work:
             return
-        if self.problem.n_uas == 1 and self.problem.tours:
+        alone = self.problem.n_uas == 1
+        if alone and self.problem.tours:
             program = self._own[0]
         else:
             program = RestrictedMilp(self.problem, self._blocks, first=self.effort.joint)
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))
-        limits = SolverLimits(nodes=self._nodes(_JOINT_NODES), relative_gap=0.01, heuristics=False)
+        nodes = self._nodes(_ALONE_NODES if alone else _JOINT_NODES)
+        limits = SolverLimits(nodes=nodes, relative_gap=0.01, heuristics=False)
         solution = self._solved(program, limits, start)
         if solution is not None:
             self.work += _JOINT_DEARER * work_of(program, solution.iterations)
