@@ -227,6 +227,12 @@ class Actor(StrictModel):
         return 2 * self.outputs - 1 if self.pointing else 1
 
     @property
+    def heights_at(self) -> tuple[int, int]:
+        """Where heights begin among these, after score and speeds, and those within 10 m."""
+        first = 1 + len(REACHES_M)
+        return first, first + (self.per_candidate - first) // 2
+
+    @property
     def features(self) -> int:
         """Numbers that the layers read."""
         return self._plain + 2 * len(REACHES_M) * len(self.vectors)
@@ -336,8 +342,7 @@ class Actor(StrictModel):
             way = maths.concatenate([shares * to_each, read[..., None, self._home_within(k)]], -2)
             level = level + finely(maths.tanh(named[..., k + 1 : k + 2]), slope) * way
             within.append(1.0 - (way * way).sum(-1)[..., None] ** 0.5)
-        first = 1 + len(REACHES_M)  # after the score and the speeds
-        near = first + (m - first) // 2
+        first, near = self.heights_at
         heights = named[..., first:near] + within[0] * named[..., near:]
         towards = maths.concatenate([on_straight_line(maths, level, slope), heights], -1)
         anywhere = 0.0 * towards[..., :1, :]

@@ -61,15 +61,16 @@ class ActorCritic(nn.Module):
                 if layer.bias is not None:
                     layer.bias.zero_()
             if network.pointing:
-                self._point_at_first(network.per_candidate)
+                self._point_at_first()
 
-    def _point_at_first(self, m: int) -> None:
+    def _point_at_first(self) -> None:
         """Fly there at some speed; seldom home, and low when near; no other numbers are given."""
+        (first, near), end = self.network.heights_at, self.network.per_candidate
         speeds = torch.tensor(_SPEEDS)
-        self.score.bias[1:3] = speeds
-        self.others.bias[1:3] = speeds
-        self.others.bias[0] = self.others.bias[m] = _SELDOM
-        self.others.bias[3 + (m - 3) // 2 : m] = _LOW
+        self.score.bias[1:first] = speeds
+        self.others.bias[1:first] = speeds
+        self.others.bias[0] = self.others.bias[end] = _SELDOM
+        self.others.bias[near:end] = _LOW
 
     def read(self, observed: NDArray[np.float32]) -> tuple[Tensor, Tensor | None]:
         """What a forward pass reads of the observations of some rows."""
