@@ -32,7 +32,9 @@ from uas_coverage_env.tasks.task import level_name
 
 DOCS = Path(__file__).parents[1] / "docs"
 REFERENCE = sorted(
-    path.stem for path in FOLDER.glob("*.toml") if not path.stem.startswith(("learned-", "ppo-"))
+    path.stem
+    for path in FOLDER.glob("*.toml")
+    if not path.stem.endswith(("-route", "-velocity", "-waypoint"))
 )
 HEAD = (
     "learner", "flown steps", "processor time, s", "trainings", "score [95 %]", "covered, %",
