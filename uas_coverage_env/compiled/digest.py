@@ -9,7 +9,7 @@ import hashlib
 import sys
 from collections.abc import Iterator
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -67,6 +67,8 @@ def _described(value: Any, within: tuple[Any, ...]) -> str:
         return f"dict {[(repr(key), _described(each, inside)) for key, each in value.items()]}"
     if isinstance(value, MethodType):
         return f"{_described(value.__self__, inside)} {_described(value.__func__, inside)}"
+    if isinstance(value, partial):
+        return f"partial {_described((value.func, value.args, value.keywords), inside)}"
     if hasattr(value, "py_func"):  # of a kernel, how it is compiled counts as well
         options = _described(sorted(value.targetoptions.items()), inside)
         return f"kernel {options} {_described(value.py_func, inside)}"
