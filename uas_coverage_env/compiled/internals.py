@@ -299,7 +299,7 @@ class _Disk:
         self._kernel, self._form, self._name = kernel, form, name
 
     @cached_property
-    def _written(self) -> CompileResultCacheImpl | None:
+    def _written(self) -> Any:
         try:
             return self._form(self._kernel.py_func)
         except (OSError, RuntimeError, TypeError):
