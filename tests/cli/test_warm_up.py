@@ -1,6 +1,8 @@
 """What the command line shows of compilations, and the command that brings them forward."""
 
 import io
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -48,17 +50,26 @@ def test_after_a_warm_up_a_run_compiles_nothing(tmp_path, monkeypatch, capsys):
     assert "everything is compiled already: nearest-waypoint\n" in capsys.readouterr().out
 
 
-def test_a_warm_up_of_the_environments_leaves_them_nothing_to_compile(monkeypatch, capsys):
+FIRST_STEPS = """
+from uas_coverage_env import uas_coverage_v0
+from uas_coverage_env.compiled.progress import COMPILATIONS
+for action in ("velocity", "waypoint"):
+    env = uas_coverage_v0.parallel_env(action=action)
+    env.reset(seed=0)
+    env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+    env = uas_coverage_v0.vector_env(2, action=action)
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+print(COMPILATIONS.n_compiled)
+"""
+
+
+def test_after_a_warm_up_of_the_environments_no_process_compiles_for_them(monkeypatch, capsys):
     monkeypatch.setattr(progress, "PATIENCE_S", 1e9)
     assert main(["planner", "warm-up", "--planner", "hover", "--environments"]) == 0
-    n_compiled = COMPILATIONS.n_compiled
-    from uas_coverage_env import uas_coverage_v0
-
-    for action in ("velocity", "waypoint"):
-        env = uas_coverage_v0.parallel_env(action=action)
-        env.reset(seed=0)
-        env.step({agent: env.action_space(agent).sample() for agent in env.agents})
-    assert COMPILATIONS.n_compiled == n_compiled
+    command = [sys.executable, "-c", FIRST_STEPS]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+    assert done.stdout == "0\n"
 
 
 @pytest.mark.slow

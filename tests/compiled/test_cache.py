@@ -244,6 +244,20 @@ def test_processes_that_compile_at_the_same_time_leave_a_whole_cache(craft):
     assert not list(craft.rglob("*.tmp.*"))
 
 
+def test_closures_that_were_compiled_by_different_processes_are_told_apart(craft):
+    (craft / "many.py").write_text(
+        "from uas_coverage_env.compiled.kernels import kernel\n"
+        "def plus(y):\n    @kernel\n    def inner(x):\n        return x + y\n    return inner\n"
+        "one, two = plus(1.0), plus(2.0)\n"
+        "@kernel\ndef first(x):\n    return one(x)\n"
+        "@kernel\ndef second(x):\n    return two(x)\n"
+        "@kernel\ndef both(x):\n    return 10.0 * one(x) + two(x)\n"
+    )
+    assert called(craft, "many", "first", 0.0) == (1.0, 0)
+    assert called(craft, "many", "second", 0.0) == (2.0, 0)
+    assert called(craft, "many", "both", 0.0) == (12.0, 0)
+
+
 def test_a_cache_file_that_was_cut_off_is_replaced(craft):
     called(craft, "craft.body", "lift")
     (kept,) = (craft / "craft/__pycache__").glob("body.lift.*.nbc")
@@ -277,6 +291,7 @@ VALUES = {
     "ROW": ["namedtuple('Row', 'x y')", "namedtuple('Row', 'y x')"],
     "helper": ["lambda x: x + 1", "lambda x: x + 2", "lambda x, y=1: x + 1"],
     "cached": ["cache(lambda x: x + 1)", "cache(lambda x: x + 2)"],
+    "bound": ["partial(max, 1)", "partial(max, 2)", "partial(min, 1)", "partial(max, default=1)"],
     "part": ["kernel(lambda x: x)", "kernel(lambda x: -x)", "inlined_kernel(lambda x: x)"],
     "module": ["made('m', X=1)", "made('m', X=2)"],
     "bound": ["partial(made, 1)", "partial(made, 2)", "partial(made, x=1)", "partial(cache, 1)"],

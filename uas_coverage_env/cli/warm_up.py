@@ -9,6 +9,7 @@ from uas_coverage_env.cli.compilation import compilation_shown, compile_flight
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.compiled.progress import COMPILATIONS
 from uas_coverage_env.compiled.purpose import compiling_for
+from uas_coverage_env.compiled.shipped import compiling_for_this_processor
 from uas_coverage_env.draw import picture
 from uas_coverage_env.env.api.parallel import CoverageParallelEnv
 from uas_coverage_env.env.api.vector import CoverageVectorEnv
@@ -46,7 +47,7 @@ def warm_up(
     names, learning = planner or list(_PLANNERS), environments or not planner
     planners = {f"planner {name}": load_planner(name) for name in names}
     started, before = time.perf_counter(), COMPILATIONS.n_compiled
-    with compilation_shown():
+    with compilation_shown(), compiling_for_this_processor():
         with compiling_for("flights and maps"):
             compile_flight(scenario, return_mode=True, safety_filter=True)
             picture(scenario, World(scenario).swarm_state())  # of the flight directory

@@ -69,6 +69,8 @@ def _described(value: Any, within: tuple[Any, ...]) -> str:
         return f"partial {_described((value.func, value.args, value.keywords), inside)}"
     if isinstance(value, MethodType):
         return f"{_described(value.__self__, inside)} {_described(value.__func__, inside)}"
+    if isinstance(value, partial):
+        return f"partial {_described((value.func, value.args, value.keywords), inside)}"
     if hasattr(value, "py_func"):  # of a kernel, how it is compiled counts as well
         options = _described(sorted(value.targetoptions.items()), inside)
         return f"kernel {options} {_described(value.py_func, inside)}"

@@ -11,8 +11,10 @@ import contextlib
 import gc
 import glob
 import hashlib
+import itertools
 import os
 import pickle
+import sys
 import uuid
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -21,6 +23,7 @@ from typing import Any
 import numba
 from llvmlite import binding
 from numba import types
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import CompileResultCacheImpl
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags, compile_result
@@ -29,6 +32,7 @@ from numba.core.serialize import dumps
 from numba.np.arrayobj import np_cfarray
 
 from uas_coverage_env.compiled.digest import MACHINERY, digest_of
+from uas_coverage_env.compiled.shipped import Processor, at_level, shipped
 
 PRIVATE = {
     "np_cfarray": "arrays that own nothing: what numba.carray does, which a GPU does not know",
@@ -69,13 +73,29 @@ PRIVATE = {
     "reduce": "to what can be written",
     "rebuild": "and back",
     "dumps": "writes it",
+    "FunctionIdentity": "numbers the functions of a process,",
+    "_unique_ids": "from here on",
     "magic_tuple": "of the processor that it is for",
     "refresh": "makes known what code that is read may call",
 }
-"""Names, and what for; at most 40. `tests/compiled/test_internals.py` looks for others."""
+"""Names, and what for; at most 42. `tests/compiled/test_internals.py` looks for others."""
 
 _VERSIONS = 64
 """Compiled versions of a function that are kept where it is built around others, or numbers."""
+
+
+def _number_functions() -> None:
+    """Let the numbers by which numba tells closures apart in machine code begin anywhere.
+
+    Each process begins at 1, and code of several processes is linked: of two closures of a function
+    that have one number, the code of the first would stand for both.
+    """
+    FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6), "big"))
+
+
+_number_functions()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_number_functions)
 
 
 def array_at(context: Any, builder: Any, array: types.Array, pointer: Any, shape: Any) -> Any:
@@ -268,8 +288,9 @@ class _Disk:
     Numba's own cache compares the file of a function alone: where a function that it calls is
     edited, it goes on to load the old code. Here each file's name says what it was compiled from,
     so that an edit anywhere below is noticed, what is unaffected stays, and files that processes
-    write at the same time never mix. Where a kernel has no file (typed into a prompt) or no folder
-    can be written to, it is compiled anew in each process.
+    write at the same time never mix. What is not there is looked for among what the package brings
+    (`shipped.py`). Where a kernel has no file (typed into a prompt) or no folder can be written to,
+    it is compiled anew in each process.
     """
 
     cache_path = None  # each kernel has its own
@@ -278,30 +299,31 @@ class _Disk:
         self._kernel, self._form, self._name = kernel, form, name
 
     @cached_property
-    def _written(self) -> CompileResultCacheImpl | None:
+    def _written(self) -> Any:
         try:
             return self._form(self._kernel.py_func)
         except (OSError, RuntimeError, TypeError):
             return None
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """A version from the disk; None: it has to be compiled."""
+        """A version from the disk, or one that the package brings; None: it has to be compiled."""
         target_context.refresh()
-        place = self._place(sig, target_context.codegen())
-        if place is None or self._written is None:
-            return None
-        try:
-            with open("".join(place), "rb") as file:
-                return self._written.rebuild(target_context, pickle.load(file))
-        except Exception:  # not there, or cut off: compiled anew and replaced
-            return None
+        processor = target_context.codegen().magic_tuple()
+        for read, compiled_for in ((self._kept, processor), (self._brought, at_level(processor))):
+            name = self._name_of(sig, compiled_for)
+            try:
+                if name is not None and (content := read(name)) is not None:
+                    return self._form.rebuild(self._written, target_context, pickle.loads(content))
+            except Exception:  # not there, or cut off: compiled anew and replaced
+                continue
+        return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
         """Write a version; a full disk costs the next process a compilation, not this its work."""
-        place = self._place(sig, cres.target_context.codegen())
-        if place is None or self._written is None or not self._written.check_cachable(cres):
+        name = self._name_of(sig, cres.target_context.codegen().magic_tuple())
+        if name is None or self._written is None or not self._written.check_cachable(cres):
             return
-        path, unfinished = "".join(place), f"{place[0]}.tmp.{uuid.uuid4().hex[:16]}"
+        path, unfinished = self._path(*name), f"{self._path(name[0])}.tmp.{uuid.uuid4().hex[:16]}"
         with contextlib.suppress(OSError):
             try:
                 with open(unfinished, "wb") as file:
@@ -309,23 +331,37 @@ class _Disk:
                 os.replace(unfinished, path)
             finally:
                 _remove(unfinished)
-            self._remove_outdated(*place)
+            self._remove_outdated(*name)
 
-    def _place(self, sig: Any, codegen: Any) -> tuple[str, str, str] | None:
-        """Path of a version: function, what that is made from, what it is compiled for."""
+    def _kept(self, name: tuple[str, str, str]) -> bytes | None:
+        if self._written is None:
+            return None
+        with open(self._path(*name), "rb") as file:
+            return file.read()
+
+    def _brought(self, name: tuple[str, str, str]) -> bytes | None:
+        return shipped("".join(name))
+
+    def _name_of(self, sig: Any, compiled_for: Processor | None) -> tuple[str, str, str] | None:
+        """Name of a version: function, what that is made from, what it is compiled for."""
         digest = digest_of(self._kernel)
-        key = repr((sig, codegen.magic_tuple(), self._name))
-        if self._written is None or digest is None or " at 0x" in key:
+        key = repr((sig, compiled_for, self._name))
+        if compiled_for is None or digest is None or " at 0x" in key:
             return None  # it depends on what only this process knows by its address
-        folder, function = self._written._locator.get_cache_path(), self._kernel.py_func
+        function = self._kernel.py_func
         module = os.path.splitext(os.path.basename(function.__code__.co_filename))[0]
         name = f"{module}.{function.__qualname__}".replace("<", "").replace(">", "")
-        stamp = hashlib.sha256(f"{numba.__version__} {MACHINERY} {digest}".encode()).hexdigest()
+        made_by = f"{sys.implementation.cache_tag} {numba.__version__} {MACHINERY}"
+        stamp = hashlib.sha256(f"{made_by} {digest}".encode()).hexdigest()
         version = hashlib.sha256(key.encode()).hexdigest()
-        return os.path.join(folder, name), f".{stamp[:16]}", f".{version[:16]}.nbc"
+        return name, f".{stamp[:16]}", f".{version[:16]}.{self._name}.nbc"
 
-    def _remove_outdated(self, stem: str, stamp: str, _: str) -> None:
+    def _path(self, *name: str) -> str:
+        return os.path.join(self._written._locator.get_cache_path(), "".join(name))
+
+    def _remove_outdated(self, function: str, stamp: str, _: str) -> None:
         """Delete what a function was before; of one that is built around others, long before."""
+        stem = self._path(function)
         paths = glob.glob(f"{glob.escape(stem)}.*.*.nbc")
         others = [path for path in paths if not path.startswith(f"{stem}{stamp}.")]
         kept = _VERSIONS if self._kernel.py_func.__closure__ else 0
