@@ -294,7 +294,6 @@ VALUES = {
     "bound": ["partial(max, 1)", "partial(max, 2)", "partial(min, 1)", "partial(max, default=1)"],
     "part": ["kernel(lambda x: x)", "kernel(lambda x: -x)", "inlined_kernel(lambda x: x)"],
     "module": ["made('m', X=1)", "made('m', X=2)"],
-    "bound": ["partial(made, 1)", "partial(made, 2)", "partial(made, x=1)", "partial(cache, 1)"],
 }
 """Values of a name that a kernel uses, each of which makes another kernel of it."""
 

@@ -65,8 +65,6 @@ def _described(value: Any, within: tuple[Any, ...]) -> str:
         return f"{kind.__qualname__} {sorted(_described(each, inside) for each in value)}"
     if isinstance(value, dict):
         return f"dict {[(repr(key), _described(each, inside)) for key, each in value.items()]}"
-    if isinstance(value, partial):
-        return f"partial {_described((value.func, value.args, value.keywords), inside)}"
     if isinstance(value, MethodType):
         return f"{_described(value.__self__, inside)} {_described(value.__func__, inside)}"
     if isinstance(value, partial):
