@@ -1,4 +1,4 @@
-"""One step of many missions, compiled: every lane is flown by `step_learners`, as a single one."""
+"""One step of many missions, compiled: in blocks of lanes, with the stages of a single one."""
 
 import math
 from functools import cache
@@ -10,18 +10,21 @@ from numba import get_thread_id, prange, types
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import (
     allocating_kernel,
+    in_turn,
     inlined_kernel,
     kernel,
     prefetch,
     rare_kernel,
     rarely,
+    stack_array_i64,
 )
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.compiled.views import Handover, copy_arrays, lane_view, rows_view
-from uas_coverage_env.entities.state import ABSENT, FLYING, SWAPPING
+from uas_coverage_env.entities.state import ABSENT, FLYING, SWAPPING, as_observed
 from uas_coverage_env.env.batch.memory import (
     DRAW,
     FLY,
+    LANES_AT_ONCE,
     NEXT_STEP,
     REST,
     SAME_STEP,
@@ -45,7 +48,7 @@ from uas_coverage_env.env.episode.act import acting_of, first_not_finite
 from uas_coverage_env.env.episode.memory import SCRATCH
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.pay import paying_of
-from uas_coverage_env.env.episode.step import ACCEPTED, Rules, step_learners_with
+from uas_coverage_env.env.episode.step import ACCEPTED, Rules, stages_with
 from uas_coverage_env.env.observation import K_WAYPOINTS
 from uas_coverage_env.env.observation.nearest import NO_TARGET
 from uas_coverage_env.env.report import (
@@ -64,7 +67,7 @@ from uas_coverage_env.world.arena import ARENA
 from uas_coverage_env.world.events import begin_events
 
 scratch_of = lane_view(SCRATCH, sized_by=ARENA)
-"""In a kernel, (`Missions.scratch`, thread, `MissionPool.arenas`, s) -> what it flies a lane in."""
+"""In a kernel, (`Missions.scratch`, place, `MissionPool.arenas`, s) -> what it flies a lane in."""
 
 
 @kernel
@@ -237,9 +240,34 @@ def _all_finite(numbers):
     return finite
 
 
+class Given(NamedTuple):
+    """What all steps of all lanes work on."""
+
+    pool: MissionPool
+    missions: Missions
+    rules: Rules
+
+
+def _example() -> Given:
+    pool = ScenarioPool("open_field")
+    paying = paying_of(V0.reward, np.zeros(len(V0.reward)), V0.reward)
+    acting = acting_of(V0.actions[0], V0.actions)
+    none = np.zeros(0, np.int64)
+    observing = observing_of(V0.observation, V0.observation)
+    rules = Rules(acting, 0, none, none, paying, observing)
+    return Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
+
+
+GIVEN = Handover(_example)
+"""How kernels are given it."""
+
+_take = GIVEN.take
+
+
 @kernel
-def _first_refused(pool, missions, orders):
+def _first_refused(given, orders):
     """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
+    pool, missions, _ = _take(given)
     asked = missions.learners.asked
     if _all_finite(rows_view(asked, 0, (asked.size,))):
         return ACCEPTED
@@ -253,57 +281,62 @@ def _first_refused(pool, missions, orders):
     return ACCEPTED
 
 
-class BatchRules(NamedTuple):
-    """What holds for all steps of all lanes."""
+def _loop_with(stage: Any, width: int, *, looks: bool) -> Any:
+    """A stage of a step as a loop over lanes; its arguments are `_LOOP`.
 
-    rules: Rules
-    autoreset: int
-    """NEXT_STEP, SAME_STEP, DISABLED or WAITS."""
-    step_lane: int
-    """Address of the step of a lane, see `lane_code`."""
+    Args:
+        stage: See `Stages`.
+        width: V. To know it when this is compiled makes a step a tenth faster.
+        looks: Whether it is one of those that observe.
+    """
+
+    @rare_kernel
+    def loop(given, lanes, n, room, observation):
+        pool, missions, rules = _take(given)
+        scene = missions.lanes.scene
+        k = 0
+        while k < n:
+            # arrays of a scene are looked up once for all lanes that follow one another in it
+            s = scene[lanes[k]]
+            arena = arena_of(pool.arenas, s)
+            tables = tables_at(pool.tables, s)
+            while k < n and scene[lanes[k]] == s:
+                lane = lanes[k]
+                state = state_of(missions.worlds, lane, pool.arenas, s)
+                learners = learners_of(missions.learners, lane, pool.arenas, s)
+                scratch = scratch_of(missions.scratch, room + k, pool.arenas, s)
+                if looks:
+                    rows = rows_view(observation, lane, (arena.uas.shape[0], width))
+                    stage(
+                        arena, as_observed(state), tables, learners, rules.observing,
+                        scratch.looks, rows,
+                    )  # fmt: skip
+                else:
+                    stage(arena, state, tables, learners, scratch, rules)
+                k += 1
+
+    return loop
 
 
-class _Given(NamedTuple):
-    """What the lanes are given, in one piece."""
-
-    pool: MissionPool
-    missions: Missions
-    rules: Rules
-
-
-def _example() -> _Given:
-    pool = ScenarioPool("open_field")
-    paying = paying_of(V0.reward, np.zeros(len(V0.reward)), V0.reward)
-    acting = acting_of(V0.actions[0], V0.actions)
-    none = np.zeros(0, np.int64)
-    observing = observing_of(V0.observation, V0.observation)
-    rules = Rules(acting, False, none, none, paying, observing)
-    return _Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
-
-
-_HANDOVER = Handover(_example)
-_keep, _take = _HANDOVER.keep, _HANDOVER.take
+_LOOP = "given, lanes, n, room, observation"
 
 
 @cache
-def fly_lane_with(step_learners: Any, begin_features: Any, *, fetches: bool) -> Any:
-    """What one lane does in a step, made of these functions.
+def finish_lane_with(begin_features: Any, width: int) -> Any:
+    """What a lane does at the end of a step: add up, or whatever else than fly it was to do.
 
     Args:
-        step_learners: See `step_learners_of`.
         begin_features: See `simulation.points.begin_features`.
-        fetches: Whether memory is fetched ahead, for which a GPU has no instruction.
+        width: V. To know it when this is compiled makes a step a tenth faster.
 
     Returns:
-        `fly_lane(pool, missions, rules, lane, order, thread, autoreset, before, observation,
-        width)`: `order` is what the lane does; `thread` which thread flies it, from 0 on; `width`
-        is V: to know it when this is compiled makes a step a tenth faster. The rest is as for
-        `step_batch`.
+        `finish_lane(pool, missions, rules, lane, order, autoreset, before, observation)`: `order`
+        is what the lane does. The rest is as for `step_batch`.
     """
     begin_lane = begin_lane_with(begin_features)
 
     @inlined_kernel
-    def fly_lane(pool, missions, rules, lane, order, thread, autoreset, before, observation, width):
+    def finish_lane(pool, missions, rules, lane, order, autoreset, before, observation):
         lanes = missions.lanes
         if rarely(order == REST):
             whole = (observation.shape[1], width)
@@ -319,21 +352,8 @@ def fly_lane_with(step_learners: Any, begin_features: Any, *, fetches: bool) -> 
                 lanes.rewards[lane, i] = 0.0
         else:
             s = lanes.scene[lane]
-            arena = arena_of(pool.arenas, s)
-            max_steps = arena.rules[0].max_steps
-            state = state_of(missions.worlds, lane, pool.arenas, s)
             learners = learners_of(missions.learners, lane, pool.arenas, s)
-            n_uas = state.uas.shape[0]
-            rows = rows_view(observation, lane, (n_uas, width))
-            if fetches:
-                _fetch_ahead(state, learners, rows)
-            _keep_last_looks(
-                missions.worlds, missions.settled, lane, n_uas, before, observation, width
-            )
-            step_learners(
-                arena, state, tables_at(pool.tables, s), learners,
-                scratch_of(missions.scratch, thread, pool.arenas, s), rules, False, rows,
-            )  # fmt: skip
+            max_steps = arena_of(pool.arenas, s).rules[0].max_steps
             over = _add_up(missions.worlds, lanes, learners, lane, max_steps)
             if over and autoreset == NEXT_STEP:
                 lanes.orders[lane] = DRAW
@@ -346,38 +366,82 @@ def fly_lane_with(step_learners: Any, begin_features: Any, *, fetches: bool) -> 
         if rarely(begins):
             begin_lane(pool, missions, rules.code, lane, order, observation, width)
 
-    return fly_lane
+    return finish_lane
 
 
 @cache
-def step_lane_with(version: Version) -> Any:
-    """One lane of `step_batch`.
+def keep_lane_with(width: int, *, fetches: bool) -> Any:
+    """What a lane does before it flies: `keep_lane(pool, missions, lane, before, observation)`.
+
+    Args:
+        width: V.
+        fetches: Whether memory is fetched ahead, for which a GPU has no instruction.
+    """
+
+    @inlined_kernel
+    def keep_lane(pool, missions, lane, before, observation):
+        s = missions.lanes.scene[lane]
+        state = state_of(missions.worlds, lane, pool.arenas, s)
+        n_uas = state.uas.shape[0]
+        if fetches:
+            learners = learners_of(missions.learners, lane, pool.arenas, s)
+            _fetch_ahead(state, learners, rows_view(observation, lane, (n_uas, width)))
+        _keep_last_looks(missions.worlds, missions.settled, lane, n_uas, before, observation, width)
+
+    return keep_lane
+
+
+@cache
+def step_block_with(version: Version, width: int) -> Any:
+    """Some lanes of `step_batch`, each stage flown by all before the next one begins.
+
+    The machine code of a whole step fits into no cache.
 
     Returns:
-        `step_lane(kept, lane, order, thread, autoreset, before, observation, width)`: `kept` is
-        `_Given`, handed over; the rest is as for `fly_lane_with`.
+        `step_block(given, orders, by_scene, first, n, thread, autoreset, before, observation)`:
+        flies the lanes by_scene[first : first + n], LANES_AT_ONCE at most; `thread` is which thread
+        flies them, from 0 on; the rest is as for `step_batch`.
     """
-    fly_lane = fly_lane_with(step_learners_with(version), begin_features, fetches=True)
+    flight, looks = stages_with(version)
+    loops = [_loop_with(stage, width, looks=False) for stage in flight]
+    loops += [_loop_with(look, width, looks=True) for look in looks]
+    fly = in_turn(loops, _LOOP)
+    keep_lane = keep_lane_with(width, fetches=True)
+    finish_lane = finish_lane_with(begin_features, width)
 
     @kernel
-    def step_lane(kept, lane, order, thread, autoreset, before, observation, width):
-        pool, missions, rules = _take(kept)
-        fly_lane(pool, missions, rules, lane, order, thread, autoreset, before, observation, width)
+    def step_block(given, orders, by_scene, first, n, thread, autoreset, before, observation):
+        pool, missions, rules = _take(given)
+        flown = stack_array_i64(LANES_AT_ONCE)
+        n_flown = np.int64(0)  # a constant would be a type of its own
+        for k in range(first, first + n):
+            lane = by_scene[k]
+            if orders[lane] == FLY:
+                flown[n_flown] = lane
+                n_flown += 1
+                keep_lane(pool, missions, lane, before, observation)
+        fly(given, flown, n_flown, thread * LANES_AT_ONCE, observation)
+        for k in range(first, first + n):
+            lane = by_scene[k]
+            finish_lane(pool, missions, rules, lane, orders[lane], autoreset, before, observation)
 
-    return step_lane
+    return step_block
 
 
-def _lane_types() -> tuple[types.Type, ...]:
+def _block_types() -> tuple[types.Type, ...]:
     number, observations = types.int64, types.Array(types.float32, 3, "C")
-    return number, number, number, number, number, observations, observations, number
+    numbers = types.Array(number, 1, "C")
+    return numbers, numbers, numbers, number, number, number, number, observations, observations
 
 
-_LANE = Signature("kept lane order thread autoreset before observation width", _lane_types)
-_step_lane_at = _LANE.call
+_BLOCK = Signature(
+    "given orders by_scene first n thread autoreset before observation", _block_types
+)
+_step_block_at = _BLOCK.call
 
 
-def lane_code(version: Version, width: int) -> int:
-    """Compile the step of a lane, or load it from the cache.
+def block_code(version: Version, width: int) -> int:
+    """Compile the step of a block of lanes, or load it from the cache.
 
     It takes ten seconds to compile, and is called at its address: once for all kernels below.
 
@@ -385,18 +449,20 @@ def lane_code(version: Version, width: int) -> int:
         version: Of the environment.
         width: Numbers of an observation.
     """
-    return _LANE.address_of(step_lane_with(version), width=width)
+    return _BLOCK.address_of(step_block_with(version, width))
 
 
 @kernel
-def step_batch(pool, missions, orders, rules, before, observation):
+def step_batch(given, orders, by_scene, autoreset, step_block, before, observation):
     """Fly all lanes for one step, or begin missions in them.
 
     Args:
-        pool: `MissionPool`.
-        missions: `Missions` with `asked` filled in; written.
+        given: What `GIVEN` says of `Given`; `asked` is filled in, the missions are written.
         orders: (L,) what each lane does; `lanes.orders`, or an array of its own.
-        rules: `BatchRules`.
+        by_scene: (L,) the lanes, those of one scene one after the other; in any other order it
+            takes longer.
+        autoreset: NEXT_STEP, SAME_STEP, DISABLED or WAITS.
+        step_block: Address of the step of a block of lanes, see `block_code`.
         before: (L, U, V) float32, the observations of the step before.
         observation: (L, U, V) float32, another array; written.
 
@@ -404,31 +470,31 @@ def step_batch(pool, missions, orders, rules, before, observation):
         ACCEPTED, or lane · U + i of the first UAS whose action is not finite; then nothing has
         changed.
     """
-    refused = _first_refused(pool, missions, orders)
+    refused = _first_refused(given, orders)
     if refused == ACCEPTED:
-        kept = _keep(_Given(pool, missions, rules.rules))
-        for lane in range(orders.shape[0]):
-            _step_lane_at(
-                rules.step_lane, kept, lane, orders[lane], 0, rules.autoreset, before, observation,
-                observation.shape[2],
+        n_lanes = orders.shape[0]
+        for first in range(0, n_lanes, LANES_AT_ONCE):
+            _step_block_at(
+                step_block, given, orders, by_scene, first, min(LANES_AT_ONCE, n_lanes - first), 0,
+                autoreset, before, observation,
             )  # fmt: skip
     return refused
 
 
 @allocating_kernel(parallel=True)
-def step_batch_in_threads(pool, missions, orders, rules, before, observation):
+def step_batch_in_threads(given, orders, by_scene, autoreset, step_block, before, observation):
     """`step_batch`, the lanes shared among numba's threads.
 
     A function of its own: to start threads takes longer than to fly a few lanes, and numba's cache
     cannot tell two ways to compile one function apart.
     """
-    refused = _first_refused(pool, missions, orders)
+    refused = _first_refused(given, orders)
     if refused == ACCEPTED:
-        kept = _keep(_Given(pool, missions, rules.rules))
-        step_lane_at, autoreset = rules.step_lane, rules.autoreset
-        for lane in prange(orders.shape[0]):
-            _step_lane_at(
-                step_lane_at, kept, np.int64(lane), orders[lane], np.int64(get_thread_id()),
-                autoreset, before, observation, observation.shape[2],
+        n_lanes = orders.shape[0]
+        for block in prange((n_lanes + LANES_AT_ONCE - 1) // LANES_AT_ONCE):
+            first = np.int64(block) * LANES_AT_ONCE
+            _step_block_at(
+                step_block, given, orders, by_scene, first, min(LANES_AT_ONCE, n_lanes - first),
+                np.int64(get_thread_id()), autoreset, before, observation,
             )  # fmt: skip
     return refused

@@ -42,6 +42,10 @@ def swarm_column(column: int) -> int:
     return SWARM_ENERGY if column == ENERGY else column - FIRST_TERM + SWARM_FIRST_TERM
 
 
+LANES_AT_ONCE = 128
+"""So many lanes fly through a stage of the step before the next one begins, at most."""
+
+
 class MissionPool(NamedTuple):
     """All that missions of S scenarios need, for kernels."""
 
@@ -111,8 +115,8 @@ class Missions(NamedTuple):
     lanes: SubEnvironments
     final: Final
     scratch: Scratch
-    """With an axis of threads in front: all lanes that a thread flies share them, so they stay in
-    its cache."""
+    """With an axis of LANES_AT_ONCE lanes for each thread in front: all that a thread flies share
+    them, so they stay in its cache."""
     settled: NDArray[np.bool_]
     """(L, U) it does not fly, and what it saw last lies in both arrays of observations."""
 
@@ -131,7 +135,7 @@ def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missi
         LEARNERS.zeros(sizes, lanes=num_envs),
         LANES.zeros(sizes),
         FINAL.zeros(sizes),
-        SCRATCH.zeros(sizes, lanes=threads),
+        SCRATCH.zeros(sizes, lanes=threads * LANES_AT_ONCE),
         np.zeros((num_envs, sizes["U"]), dtype=np.bool_),
     )
     seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)

@@ -84,6 +84,8 @@ class Scratch(NamedTuple):
     outcome: Annotated[NDArray[np.void], OUTCOME_DTYPE, "U"]
     values: Annotated[NDArray[np.float64], "U", "A"]
     """The numbers of an action in their units."""
+    looks: Annotated[NDArray[np.bool_], "U"]
+    """It observes in this step."""
 
 
 class Acting(NamedTuple):
