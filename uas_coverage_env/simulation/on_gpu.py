@@ -11,7 +11,7 @@ from uas_coverage_env.simulation.step import WorldStages, stages_with
 
 
 @cache
-def stages_of(features: tuple[MissionFeature, ...], otherwise: bool) -> WorldStages:
+def stages_on_gpu(features: tuple[MissionFeature, ...], otherwise: bool) -> WorldStages:
     """The stages of `step.advance` with the kernels of features, without assistants and code.
 
     Args:
