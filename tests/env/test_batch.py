@@ -6,9 +6,9 @@ import pytest
 from gymnasium.error import ResetNeeded
 from practice_grounds import practice_ground, with_roles
 
+from uas_coverage_env.entities.state import ABSENT, FLYING, LOST
 from uas_coverage_env.env import CoverageBatch, CoverageParallelEnv
 from uas_coverage_env.env.actions.kinds import ACTION_NAMES
-from uas_coverage_env.entities.state import ABSENT, FLYING, LOST
 from uas_coverage_env.env.batch.lane import drawn
 from uas_coverage_env.env.batch.pool import ScenarioPool
 from uas_coverage_env.env.episode.settings import MissionSettings

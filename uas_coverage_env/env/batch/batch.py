@@ -95,6 +95,7 @@ class CoverageBatch:
         pool: The scenarios.
         missions: What happened, see `Missions`; the arrays are written by every step.
         autoreset: As in `batch_memory`.
+        call: Calls the compiled step.
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
@@ -135,7 +136,7 @@ class CoverageBatch:
         # `_draw_next` comes between the end of a mission and the next
         begins_later = self._begins_here and self.autoreset == SAME_STEP
         autoreset = DISABLED if begins_later else self.autoreset
-        self._call = BatchCall(
+        self.call = BatchCall(
             self.settings, self.pool, self.missions, self._observing, autoreset, int(threads)
         )
 
@@ -268,7 +269,7 @@ class CoverageBatch:
             change_scenes(self.pool, self.missions, flew, self._observing, self.observation)
         if self._begins_here:
             self._draw_next(orders == DRAW)
-        if self._call.is_own:
+        if self.call.is_own:
             names = [f"UAS {i}" for i in range(self.n_uas)]
             refuse_what_it_wrote(self.actions.kind, self.learners.asked, names)
         return self.observation
@@ -388,7 +389,7 @@ class CoverageBatch:
         before, free = self._observations
         if in_place:
             free = before
-        refused = self._call(orders, before, free)
+        refused = self.call(orders, before, free)
         if refused == ACCEPTED and not in_place:
             self._observations = free, before
         return refused

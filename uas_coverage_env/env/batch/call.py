@@ -76,12 +76,12 @@ class BatchCall:
             # as 16 bits they are sorted in a tenth of the time
             scenes = self._missions.lanes.scene.astype(np.uint16)
             self._by_scene = np.argsort(scenes, kind="stable")
-        handed_over = self._handed_over()
+        numbers = self.numbers
         if self._kernel is None:
             version = self._settings.version
             self._block = block_code(version, self._settings.observation_size)
         given = (
-            handed_over, orders, self._by_scene, self._at_once, self._autoreset, self._block,
+            numbers, orders, self._by_scene, self._at_once, self._autoreset, self._block,
             before, observation,
         )  # fmt: skip
         if self._kernel is None:
@@ -99,7 +99,8 @@ class BatchCall:
         finally:
             numba.set_num_threads(threads)
 
-    def _handed_over(self) -> NDArray[np.int64]:
+    @property
+    def numbers(self) -> NDArray[np.int64]:
         """What kernels are given of arrays that stay where they are, until a pool gets new ones."""
         pool = self._pool.arrays
         if self._given is None:

@@ -134,6 +134,51 @@ def _loop_with(stage: Any, width: int, *, looks: bool) -> Any:
 _LOOP = "given, lanes, n, room, observation"
 
 
+class BlockParts(NamedTuple):
+    """What a block of lanes does in a step, one after the other; arguments as for `step_batch`."""
+
+    gather: Any
+    """`gather(given, orders, by_scene, first, n, flown, before, observation)`: writes into `flown`
+    which of the lanes by_scene[first : first + n] fly; returns how many."""
+    loops: tuple[Any, ...]
+    """Each stage of the flight and of what is observed, `loop(given, flown, n_flown, room,
+    observation)`; `room` is the first of their places in the scratch."""
+    finish: Any
+    """`finish(given, orders, by_scene, first, n, autoreset, before, observation)`: adds up, begins
+    missions and keeps those that rest."""
+
+
+@cache
+def block_parts_with(version: Version, width: int) -> BlockParts:
+    """The parts of a version, compiled for observations of so many numbers."""
+    flight, looks = stages_with(version)
+    keep_lane = keep_lane_with(width, fetches=True)
+    finish_lane = finish_lane_with(begin_features, width)
+
+    @rare_kernel
+    def gather(given, orders, by_scene, first, n, flown, before, observation):
+        pool, missions, _ = _take(given)
+        n_flown = 0
+        for k in range(first, first + n):
+            lane = by_scene[k]
+            if orders[lane] == FLY:
+                flown[n_flown] = lane
+                n_flown += 1
+                keep_lane(pool, missions, lane, before, observation)
+        return n_flown
+
+    @rare_kernel
+    def finish(given, orders, by_scene, first, n, autoreset, before, observation):
+        pool, missions, rules = _take(given)
+        for k in range(first, first + n):
+            lane = by_scene[k]
+            finish_lane(pool, missions, rules, lane, orders[lane], autoreset, before, observation)
+
+    loops = [_loop_with(stage, width, looks=False) for stage in flight]
+    loops += [_loop_with(look, width, looks=True) for look in looks]
+    return BlockParts(gather, tuple(loops), finish)
+
+
 @cache
 def step_block_with(version: Version, width: int) -> Any:
     """Some lanes of `step_batch`, each stage flown by all before the next one begins.
@@ -141,32 +186,18 @@ def step_block_with(version: Version, width: int) -> Any:
     The machine code of a whole step fits into no cache.
 
     Returns:
-        `step_block(given, orders, by_scene, first, n, room, autoreset, before, observation)`:
-        flies the lanes by_scene[first : first + n]; `room` is the first of n places in the scratch
-        for them; the rest is as for `step_batch`.
+        `step_block(given, orders, by_scene, first, n, room, autoreset, before, observation)`, see
+        `BlockParts`.
     """
-    flight, looks = stages_with(version)
-    loops = [_loop_with(stage, width, looks=False) for stage in flight]
-    loops += [_loop_with(look, width, looks=True) for look in looks]
+    gather, loops, finish = block_parts_with(version, width)
     fly = in_turn(loops, _LOOP)
-    keep_lane = keep_lane_with(width, fetches=True)
-    finish_lane = finish_lane_with(begin_features, width)
 
     @kernel
     def step_block(given, orders, by_scene, first, n, room, autoreset, before, observation):
-        pool, missions, rules = _take(given)
         flown = stack_array_i64(UAS_AT_ONCE)
-        n_flown = np.int64(0)  # a constant would be a type of its own
-        for k in range(first, first + n):
-            lane = by_scene[k]
-            if orders[lane] == FLY:
-                flown[n_flown] = lane
-                n_flown += 1
-                keep_lane(pool, missions, lane, before, observation)
+        n_flown = gather(given, orders, by_scene, first, n, flown, before, observation)
         fly(given, flown, n_flown, room, observation)
-        for k in range(first, first + n):
-            lane = by_scene[k]
-            finish_lane(pool, missions, rules, lane, orders[lane], autoreset, before, observation)
+        finish(given, orders, by_scene, first, n, autoreset, before, observation)
 
     return step_block
 

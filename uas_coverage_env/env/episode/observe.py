@@ -112,14 +112,18 @@ def _written(blocks: Blocks, column: int, first: int) -> Any:
 LOOK = "arena, state, tables, learners, observing, looks, observation"
 """The arguments of a look."""
 
-_NUMBERS_OF_A_LOOK = 20
-"""Blocks that follow one another become one look until they have so many numbers."""
+_NUMBERS_OF_A_LOOK = 48
 
 
-def _grouped(own: Blocks) -> list[Blocks]:
+def blocks_of_looks(own: Blocks) -> list[Blocks]:
+    """Which blocks are written by each look after the first, see `looks_with`.
+
+    As many as follow one another and have no more numbers than `_NUMBERS_OF_A_LOOK`; one at least.
+    """
     groups: list[Blocks] = []
     for block in own:
-        if not groups or sum(each.size for each in groups[-1]) >= _NUMBERS_OF_A_LOOK:
+        n = sum(each.size for each in groups[-1]) if groups else _NUMBERS_OF_A_LOOK
+        if n + block.size > _NUMBERS_OF_A_LOOK:
             groups.append(())
         groups[-1] = (*groups[-1], block)
     return groups
@@ -180,14 +184,16 @@ def looks_with(own: Blocks, *, calls: bool = True) -> tuple[Any, ...]:
     looks = [_choose]
     column = first = 0
     known: set[Any] = set()
-    for blocks in _grouped(own):
+    for blocks in blocks_of_looks(own):
         needs = dict.fromkeys(note for block in blocks for note in block.needs)
         note = noted([each for each in needs if each not in known])
         known |= needs.keys()
         looks.append(_look_of(note, _written(blocks, column, first), calls))
         column += sum(block.size for block in blocks)
         first += sum(len(block.parameters) for block in blocks)
-    return (*looks, _call) if calls else tuple(looks)
+    if calls:
+        looks[-1] = in_turn((looks[-1], _call), LOOK)
+    return tuple(looks)
 
 
 @cache
