@@ -63,7 +63,7 @@ class BatchCall:
     @property
     def is_own(self) -> bool:
         """Whether the kind of action is none of the version; False before the first call."""
-        return self._given is not None and is_own(self._given[0].rules.acting)
+        return self._given is not None and is_own(self._given[0].flight.rules.acting)
 
     def __call__(
         self,
@@ -104,10 +104,10 @@ class BatchCall:
         """What kernels are given of arrays that stay where they are, until a pool gets new ones."""
         pool = self._pool.arrays
         if self._given is None:
-            given = Given(pool, self._missions, self._rules())
+            given = Given.of(pool, self._missions, self._rules())
             self._given = given, GIVEN.numbers_of(given)
         elif any(now is not kept for now, kept in zip(pool, self._given[0].pool, strict=True)):
-            given = self._given[0]._replace(pool=pool)
+            given = Given.of(pool, self._missions, self._given[0].flight.rules)
             self._given = given, GIVEN.numbers_of(given)
         return self._given[1]
 

@@ -2,10 +2,11 @@
 
 import math
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numba import get_thread_id, prange, types
+from numpy.typing import NDArray
 
 from uas_coverage_env.compiled.calls import Signature
 from uas_coverage_env.compiled.kernels import (
@@ -15,8 +16,9 @@ from uas_coverage_env.compiled.kernels import (
     rare_kernel,
     stack_array_i64,
 )
+from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.views import Handover, lane_view, rows_view
-from uas_coverage_env.entities.state import as_observed
+from uas_coverage_env.entities.state import WorldState, as_observed
 from uas_coverage_env.env.batch.lane import finish_lane_with, keep_lane_with
 from uas_coverage_env.env.batch.memory import (
     FLY,
@@ -31,7 +33,7 @@ from uas_coverage_env.env.batch.pool import (
     tables_at,
 )
 from uas_coverage_env.env.episode.act import acting_of, first_not_finite
-from uas_coverage_env.env.episode.memory import SCRATCH
+from uas_coverage_env.env.episode.memory import SCRATCH, Learners, Scratch
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.pay import paying_of
 from uas_coverage_env.env.episode.step import ACCEPTED, Rules, stages_with
@@ -53,12 +55,34 @@ def _all_finite(numbers):
     return finite
 
 
+class Flight(NamedTuple):
+    """What the stages of a step work on."""
+
+    arenas: Pool
+    tables: Pool
+    worlds: WorldState
+    learners: Learners
+    scratch: Scratch
+    scene: NDArray[np.int64]
+    """Of `SubEnvironments`."""
+    rules: Rules
+
+
 class Given(NamedTuple):
     """What all steps of all lanes work on."""
 
+    flight: Flight
     pool: MissionPool
     missions: Missions
-    rules: Rules
+
+    @classmethod
+    def of(cls, pool: MissionPool, missions: Missions, rules: Rules) -> Self:
+        """For a pool and missions."""
+        flight = Flight(
+            pool.arenas, pool.tables, missions.worlds, missions.learners, missions.scratch,
+            missions.lanes.scene, rules,
+        )  # fmt: skip
+        return cls(flight, pool, missions)
 
 
 def _example() -> Given:
@@ -68,27 +92,27 @@ def _example() -> Given:
     none = np.zeros(0, np.int64)
     observing = observing_of(V0.observation, V0.observation)
     rules = Rules(acting, 0, none, none, paying, observing)
-    return Given(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
+    return Given.of(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
 
 
 GIVEN = Handover(_example)
 """How kernels are given it."""
 
-_take = GIVEN.take
+_take, _take_flight = GIVEN.take, GIVEN.take_first
 
 
 @kernel
 def _first_refused(given, orders):
     """The first UAS, lane · U + i, whose action is not finite; ACCEPTED where there is none."""
-    pool, missions, _ = _take(given)
-    asked = missions.learners.asked
+    flight = _take_flight(given)
+    asked = flight.learners.asked
     if _all_finite(rows_view(asked, 0, (asked.size,))):
         return ACCEPTED
     for lane in range(asked.shape[0]):
         if orders[lane] != FLY:
             continue
-        s = missions.lanes.scene[lane]
-        i = first_not_finite(learners_of(missions.learners, lane, pool.arenas, s).asked)
+        s = flight.scene[lane]
+        i = first_not_finite(learners_of(flight.learners, lane, flight.arenas, s).asked)
         if i != ACCEPTED:
             return lane * asked.shape[1] + i
     return ACCEPTED
@@ -105,19 +129,18 @@ def _loop_with(stage: Any, width: int, *, looks: bool) -> Any:
 
     @rare_kernel
     def loop(given, lanes, n, room, observation):
-        pool, missions, rules = _take(given)
-        scene = missions.lanes.scene
+        arenas, all_tables, worlds, all_learners, all_scratch, scene, rules = _take_flight(given)
         k = 0
         while k < n:
             # arrays of a scene are looked up once for all lanes that follow one another in it
             s = scene[lanes[k]]
-            arena = arena_of(pool.arenas, s)
-            tables = tables_at(pool.tables, s)
+            arena = arena_of(arenas, s)
+            tables = tables_at(all_tables, s)
             while k < n and scene[lanes[k]] == s:
                 lane = lanes[k]
-                state = state_of(missions.worlds, lane, pool.arenas, s)
-                learners = learners_of(missions.learners, lane, pool.arenas, s)
-                scratch = scratch_of(missions.scratch, room + k, pool.arenas, s)
+                state = state_of(worlds, lane, arenas, s)
+                learners = learners_of(all_learners, lane, arenas, s)
+                scratch = scratch_of(all_scratch, room + k, arenas, s)
                 if looks:
                     rows = rows_view(observation, lane, (arena.uas.shape[0], width))
                     stage(
@@ -157,7 +180,7 @@ def block_parts_with(version: Version, width: int) -> BlockParts:
 
     @rare_kernel
     def gather(given, orders, by_scene, first, n, flown, before, observation):
-        pool, missions, _ = _take(given)
+        _, pool, missions = _take(given)
         n_flown = 0
         for k in range(first, first + n):
             lane = by_scene[k]
@@ -169,10 +192,12 @@ def block_parts_with(version: Version, width: int) -> BlockParts:
 
     @rare_kernel
     def finish(given, orders, by_scene, first, n, autoreset, before, observation):
-        pool, missions, rules = _take(given)
+        flight, pool, missions = _take(given)
         for k in range(first, first + n):
             lane = by_scene[k]
-            finish_lane(pool, missions, rules, lane, orders[lane], autoreset, before, observation)
+            finish_lane(
+                pool, missions, flight.rules, lane, orders[lane], autoreset, before, observation
+            )
 
     loops = [_loop_with(stage, width, looks=False) for stage in flight]
     loops += [_loop_with(look, width, looks=True) for look in looks]

@@ -65,21 +65,7 @@ def _with_notes(write: Any, needs: tuple[Any, ...]) -> Any:
 
 def noted(needs: Sequence[Any]) -> Any:
     """One kernel that calls others in turn."""
-    if not needs:
-
-        @inlined_kernel
-        def note_nothing(arena, state, tables, learners, i):
-            pass
-
-        return note_nothing
-    note, rest = needs[0], noted(needs[1:])
-
-    @inlined_kernel
-    def note_both(arena, state, tables, learners, i):
-        note(arena, state, tables, learners, i)
-        rest(arena, state, tables, learners, i)
-
-    return note_both
+    return in_turn(needs, "arena, state, tables, learners, i")
 
 
 def _written(blocks: Blocks, column: int, first: int) -> Any:
@@ -88,14 +74,17 @@ def _written(blocks: Blocks, column: int, first: int) -> Any:
     Nested, one function a block: of all of them written out in one, which compiles a second
     faster, LLVM makes a batch's step that takes a tenth longer.
     """
-    if not blocks:
+    write, size, n = blocks[0].write, blocks[0].size, len(blocks[0].parameters)
+    if len(blocks) == 1:
 
         @inlined_kernel
-        def write_nothing(arena, state, tables, learners, parameters, i, row):
-            pass
+        def write_last(arena, state, tables, learners, parameters, i, row):
+            write(
+                arena, state, tables, learners, i,
+                slice_view(parameters, first, n), slice_view(row, column, size),
+            )  # fmt: skip
 
-        return write_nothing
-    write, size, n = blocks[0].write, blocks[0].size, len(blocks[0].parameters)
+        return write_last
     rest = _written(blocks[1:], column + size, first + n)
 
     @inlined_kernel
@@ -136,15 +125,17 @@ def _choose(arena, state, tables, learners, observing, looks, observation):
             nearest_waypoints(arena, state, i, learners.candidates[i])
 
 
-def _look_of(note: Any, write: Any, calls: bool) -> Any:
+def _look_of(needs: Sequence[Any], write: Any, calls: bool) -> Any:
     """A look that writes blocks, after what has to be noted for them."""
+    note, notes = noted(needs), bool(needs)
 
     @inlined_kernel
     def look(arena, state, tables, learners, observing, looks, observation):
         if not calls or observing.begins_as_version[0]:
             for i in range(looks.shape[0]):
                 if looks[i]:
-                    note(arena, state, tables, learners, i)
+                    if notes:
+                        note(arena, state, tables, learners, i)
                     write(
                         arena, state, tables, learners, observing.parameters, i, observation[i]
                     )  # fmt: skip
@@ -186,9 +177,9 @@ def looks_with(own: Blocks, *, calls: bool = True) -> tuple[Any, ...]:
     known: set[Any] = set()
     for blocks in blocks_of_looks(own):
         needs = dict.fromkeys(note for block in blocks for note in block.needs)
-        note = noted([each for each in needs if each not in known])
+        new = [note for note in needs if note not in known]
         known |= needs.keys()
-        looks.append(_look_of(note, _written(blocks, column, first), calls))
+        looks.append(_look_of(new, _written(blocks, column, first), calls))
         column += sum(block.size for block in blocks)
         first += sum(len(block.parameters) for block in blocks)
     if calls:

@@ -44,18 +44,16 @@ class Rules(NamedTuple):
     observing: Observing
 
 
-def pay_step_with(compute_rewards: Any) -> Any:
-    """A kernel that rewards and reports a step.
+def _pay_with(compute_rewards: Any) -> Any:
+    """The stage that rewards and reports a step, and says who looks around.
 
     Args:
         compute_rewards: See `pay.compute_rewards_with`.
-
-    Returns:
-        `pay_step(arena, state, tables, learners, scratch, paying)`.
     """
 
     @inlined_kernel
-    def pay_step(arena, state, tables, learners, scratch, paying):
+    def pay(arena, state, tables, learners, scratch, rules):
+        paying = rules.paying
         report, amounts = learners.report, learners.amounts
         outcome = scratch.outcome
         compute_rewards(arena, state, tables, learners, scratch, paying)
@@ -85,7 +83,7 @@ def pay_step_with(compute_rewards: Any) -> Any:
                 learners.targets[i] = NO_TARGET
             scratch.looks[i] = flew or status in (FLYING, SWAPPING)
 
-    return pay_step
+    return pay
 
 
 STAGE = "arena, state, tables, learners, scratch, rules"
@@ -119,7 +117,6 @@ def stages_of(
         looks: See `observe.looks_with`.
     """
     prepare, move_world, judge_world = world
-    pay_step = pay_step_with(compute_rewards)
 
     @inlined_kernel
     def act(arena, state, tables, learners, scratch, rules):
@@ -141,11 +138,7 @@ def stages_of(
     def judge(arena, state, tables, learners, scratch, rules):
         judge_world(arena, state, rules.nonlinear != 0, rules.code, scratch.outcome)
 
-    @inlined_kernel
-    def pay(arena, state, tables, learners, scratch, rules):
-        pay_step(arena, state, tables, learners, scratch, rules.paying)
-
-    return Stages((act, move, meet, judge, pay), looks)
+    return Stages((act, move, meet, judge, _pay_with(compute_rewards)), looks)
 
 
 @cache
