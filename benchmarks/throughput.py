@@ -47,6 +47,9 @@ DRAWN = ("generated", "streets", "hard", "own-scenes")
 
 DRAWN_ENVS = 1024
 
+PROFILED, STEPS_A_TURN = 256, 40
+"""Missions of `--profile`, unless one number is given, and how many of their steps a turn is."""
+
 SYNC_ENVS = 64
 """So many single environments stand for the naive way, `SyncVectorEnv`."""
 
@@ -338,7 +341,8 @@ def main(
         # only here: it compiles what it measures
         from throughput_profile import profile_table
 
-        console.print(profile_table(turns))
+        n_lanes = int(envs) if envs.isdecimal() else PROFILED
+        console.print(profile_table(turns * STEPS_A_TURN, n_lanes))
         return
     chosen = {"none": [], "all": list(PEERS)}.get(peers, peers.split(","))
     unknown = [peer for peer in chosen if peer not in PEERS]

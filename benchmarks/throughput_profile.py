@@ -19,7 +19,6 @@ from uas_coverage_env.env.episode.observe import blocks_of_looks
 from uas_coverage_env.env.episode.step import stages_with
 from uas_coverage_env.env.versions import V0
 
-N_LANES = 256
 N_STEPS = 60
 """Flown before the clock starts."""
 
@@ -92,7 +91,7 @@ class _Parts:
             timed("sums, ends, new missions", self._parts.finish, *block, NEXT_STEP, *arrays)
 
 
-def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
+def nanoseconds(repeats: int, n_lanes: int) -> dict[str, float]:
     """Median time of each part per agent-step [ns], and of the whole step.
 
     Raises:
@@ -121,9 +120,9 @@ def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
     return {name: float(np.median(each)) for name, each in taken.items()}
 
 
-def profile_table(repeats: int) -> Table:
+def profile_table(repeats: int, n_lanes: int) -> Table:
     """The times as a table, with shares of the whole step."""
-    times_ns = nanoseconds(max(repeats, 200))
+    times_ns = nanoseconds(repeats, n_lanes)
     table = Table("part", "ns per agent-step", "share")
     for name, time_ns in times_ns.items():
         table.add_row(name, f"{time_ns:.0f}", f"{time_ns / times_ns[WHOLE]:.0%}")
