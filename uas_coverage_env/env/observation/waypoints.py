@@ -19,7 +19,7 @@ from uas_coverage_env.env.observation.block import (
 )
 from uas_coverage_env.env.observation.nearest import DENSITY, NEXT
 from uas_coverage_env.env.observation.relative import STRAIGHT_M, within
-from uas_coverage_env.env.observation.scales import HEIGHT_M, K_WAYPOINTS, MARGIN, NEARBY_M
+from uas_coverage_env.env.observation.scales import AT_ONCE, HEIGHT_M, K_WAYPOINTS, MARGIN, NEARBY_M
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.arena import Arena
 from uas_coverage_env.world.waypoints import DOWN_M, EAST_M, NORTH_M, WEIGHT
@@ -47,12 +47,9 @@ _GROUP = Group("waypoints", K_WAYPOINTS, _FEATURES)
 _AT = _GROUP.columns
 _WIDTH = _GROUP.width
 
-_ROOM = 16
-"""So many waypoints the processor takes at once; those beyond K_WAYPOINTS are left out."""
+_N_NUMBERS = _WIDTH * AT_ONCE
 
-_N_NUMBERS = _WIDTH * _ROOM
-
-_write_rows = transposing(K_WAYPOINTS, _WIDTH, _ROOM)
+_write_rows = transposing(K_WAYPOINTS, _WIDTH, AT_ONCE)
 
 FIXED_DTYPE = record_dtype([("home_m", "f4"), ("weight", "f4"), ("from_home", "f4")])
 """What a UAS is told of a waypoint at all times: its distance from the start, and two features."""
@@ -87,12 +84,12 @@ def _others_near(state, i, targets, wanted, north_m, east_m, down_m, other_m2, t
         state: The state of the world.
         i: Index of the UAS.
         targets: (U,) where each is flying to.
-        wanted: (_ROOM,) indices of the waypoints.
-        north_m: (_ROOM,) where they are [m]; likewise east_m and down_m.
+        wanted: (AT_ONCE,) indices of the waypoints.
+        north_m: (AT_ONCE,) where they are [m]; likewise east_m and down_m.
         east_m: See north_m.
         down_m: See north_m.
-        other_m2: (_ROOM,) [m²] infinite; written.
-        taken: (_ROOM,) zero; written, 1 where one goes there.
+        other_m2: (AT_ONCE,) [m²] infinite; written.
+        taken: (AT_ONCE,) zero; written, 1 where one goes there.
     """
     for j in range(state.uas.shape[0]):
         if j == i or state.uas[j].status != FLYING:
@@ -100,14 +97,14 @@ def _others_near(state, i, targets, wanted, north_m, east_m, down_m, other_m2, t
         x = state.x[j, S.X]
         y = state.x[j, S.Y]
         z = state.x[j, S.Z]
-        for c in range(_ROOM):
+        for c in range(AT_ONCE):
             dx = np.float32(north_m[c] - x)
             dy = np.float32(east_m[c] - y)
             dz = np.float32(down_m[c] - z)
             other_m2[c] = min(other_m2[c], dx * dx + dy * dy + dz * dz)
         if targets[j] >= 0 and not state.uas[j].returning:
             target = float(targets[j])
-            for c in range(_ROOM):
+            for c in range(AT_ONCE):
                 taken[c] = _ONE if wanted[c] == target else taken[c]
 
 
@@ -134,25 +131,25 @@ def write(arena, state, tables, learners, i, parameters, row):
     z = state.x[i, S.Z]
     margin_per_m = np.float32(uas.dod_per_s / (uas.speed_mps * MARGIN))
     margin_left = np.float32((uas.dod_max - state.x[i, S.DOD]) * (1.0 / MARGIN))
-    wanted = stack_array(_ROOM)
-    north_m = stack_array(_ROOM)
-    east_m = stack_array(_ROOM)
-    down_m = stack_array(_ROOM)
-    home_m = stack_array_f32(_ROOM)
-    other_m2 = stack_array_f32(_ROOM)
+    wanted = stack_array(AT_ONCE)
+    north_m = stack_array(AT_ONCE)
+    east_m = stack_array(AT_ONCE)
+    down_m = stack_array(AT_ONCE)
+    home_m = stack_array_f32(AT_ONCE)
+    other_m2 = stack_array_f32(AT_ONCE)
     features = stack_array_f32(_N_NUMBERS)
-    valid = slice_view(features, _ROOM * _AT.valid, _ROOM)
-    north = slice_view(features, _ROOM * _AT.direction, _ROOM)
-    east = slice_view(features, _ROOM * (_AT.direction + 1), _ROOM)
-    there = slice_view(features, _ROOM * _AT.closeness, _ROOM)
-    below = slice_view(features, _ROOM * _AT.below, _ROOM)
-    weight = slice_view(features, _ROOM * _AT.weight, _ROOM)
-    neighbour = slice_view(features, _ROOM * _AT.neighbour, _ROOM)
-    density = slice_view(features, _ROOM * _AT.density, _ROOM)
-    other = slice_view(features, _ROOM * _AT.nearest_uas, _ROOM)
-    taken = slice_view(features, _ROOM * _AT.taken, _ROOM)
-    from_home = slice_view(features, _ROOM * _AT.from_home, _ROOM)
-    margin = slice_view(features, _ROOM * _AT.energy_margin, _ROOM)
+    valid = slice_view(features, AT_ONCE * _AT.valid, AT_ONCE)
+    north = slice_view(features, AT_ONCE * _AT.direction, AT_ONCE)
+    east = slice_view(features, AT_ONCE * (_AT.direction + 1), AT_ONCE)
+    there = slice_view(features, AT_ONCE * _AT.closeness, AT_ONCE)
+    below = slice_view(features, AT_ONCE * _AT.below, AT_ONCE)
+    weight = slice_view(features, AT_ONCE * _AT.weight, AT_ONCE)
+    neighbour = slice_view(features, AT_ONCE * _AT.neighbour, AT_ONCE)
+    density = slice_view(features, AT_ONCE * _AT.density, AT_ONCE)
+    other = slice_view(features, AT_ONCE * _AT.nearest_uas, AT_ONCE)
+    taken = slice_view(features, AT_ONCE * _AT.taken, AT_ONCE)
+    from_home = slice_view(features, AT_ONCE * _AT.from_home, AT_ONCE)
+    margin = slice_view(features, AT_ONCE * _AT.energy_margin, AT_ONCE)
     n = 0
     for c in range(K_WAYPOINTS):
         # an end that cannot be foretold: so the compiler does not read several waypoints at a time,
@@ -172,14 +169,14 @@ def write(arena, state, tables, learners, i, parameters, row):
         # here already: of 1000 missions, most of this lies far from the processor
         neighbour[c] = around[w, NEXT]
         density[c] = around[w, DENSITY]
-    for c in range(n, _ROOM):
+    for c in range(n, AT_ONCE):
         wanted[c] = north_m[c] = east_m[c] = down_m[c] = 0.0
         home_m[c] = weight[c] = from_home[c] = neighbour[c] = density[c] = _ZERO
-    for c in range(_ROOM):
+    for c in range(AT_ONCE):
         other_m2[c] = _INFINITE
         taken[c] = _ZERO
     _others_near(state, i, learners.targets, wanted, north_m, east_m, down_m, other_m2, taken)
-    for c in range(_ROOM):
+    for c in range(AT_ONCE):
         dx = np.float32(north_m[c] - x)
         dy = np.float32(east_m[c] - y)
         dz = np.float32(down_m[c] - z)
