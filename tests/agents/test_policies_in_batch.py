@@ -35,6 +35,7 @@ def trained(tmp_path, monkeypatch):
     [
         ("ppo", ["agent=each", "environment.action=velocity"], "hard"),
         ("maskable-ppo", ["agent=each", "environment.reward_weights={energy=9.0}"], "hard"),
+        ("maskable-ppo", ["agent=each", "environment.version=v1"], "hard-v1"),
         ("ppo", ["agent=swarm", "environment.observation=local"], "medium"),
     ],
 )

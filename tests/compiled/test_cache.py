@@ -9,7 +9,7 @@ import types
 from collections import namedtuple
 from concurrent.futures import ThreadPoolExecutor
 from enum import Enum
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,11 @@ import pytest
 from new_process import in_new_process
 
 from uas_coverage_env.compiled import digest
+from uas_coverage_env.compiled.internals import KernelDispatcher
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.env.batch.kernel import step_batch, step_batch_in_threads, step_lane_with
+from uas_coverage_env.env.episode.step import step_episode_with
+from uas_coverage_env.env.versions import V0, V1
 
 PACKAGE = Path(digest.__file__).parents[1]
 ROOT = PACKAGE.parent
@@ -275,6 +279,7 @@ VALUES = {
     "cached": ["cache(lambda x: x + 1)", "cache(lambda x: x + 2)"],
     "part": ["kernel(lambda x: x)", "kernel(lambda x: -x)", "inlined_kernel(lambda x: x)"],
     "module": ["made('m', X=1)", "made('m', X=2)"],
+    "bound": ["partial(made, 1)", "partial(made, 2)", "partial(made, x=1)", "partial(cache, 1)"],
 }
 """Values of a name that a kernel uses, each of which makes another kernel of it."""
 
@@ -289,6 +294,7 @@ KNOWN: dict[str, Any] = {
     "np": np,
     "made": made,
     "cache": cache,
+    "partial": partial,
     "namedtuple": namedtuple,
     "Enum": Enum,
     "kernel": kernel,
@@ -321,6 +327,25 @@ def test_what_an_object_has_computed_since_makes_no_other_kernel():
     before = digest_where("one", "table")
     assert KNOWN["table"].total == 1.0
     assert digest_where("one", "table") == before is not None
+
+
+@pytest.mark.parametrize("version", [V0, V1], ids=lambda version: version.name)
+def test_the_steps_of_all_environments_are_kept_on_disk(version):
+    alone, lane = step_episode_with(version), step_lane_with(version)
+    for step in (alone, lane, step_batch, step_batch_in_threads):
+        assert digest.digest_of(step), step
+
+
+def test_all_kernels_of_the_package_are_kept_on_disk():
+    ours = {
+        name: value
+        for module in [*sys.modules.values()]
+        if getattr(module, "__name__", "").startswith("uas_coverage_env.")
+        for name, value in vars(module).items()
+        if isinstance(value, KernelDispatcher)
+    }
+    assert len(ours) > 100
+    assert [name for name, each in ours.items() if digest.digest_of(each) is None] == []
 
 
 def test_what_only_this_process_knows_by_its_address_has_no_digest():

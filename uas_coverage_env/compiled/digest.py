@@ -9,7 +9,7 @@ import hashlib
 import sys
 from collections.abc import Iterator
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -65,6 +65,8 @@ def _described(value: Any, within: tuple[Any, ...]) -> str:
         return f"{kind.__qualname__} {sorted(_described(each, inside) for each in value)}"
     if isinstance(value, dict):
         return f"dict {[(repr(key), _described(each, inside)) for key, each in value.items()]}"
+    if isinstance(value, partial):
+        return f"partial {_described((value.func, value.args, value.keywords), inside)}"
     if isinstance(value, MethodType):
         return f"{_described(value.__self__, inside)} {_described(value.__func__, inside)}"
     if hasattr(value, "py_func"):  # of a kernel, how it is compiled counts as well

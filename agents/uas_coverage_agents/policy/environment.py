@@ -31,6 +31,12 @@ def plain(keywords: Mapping[str, Any]) -> dict[str, JsonValue]:
     return {**keywords, **version}
 
 
+def as_given(written: Mapping[str, JsonValue]) -> dict[str, Any]:
+    """Keyword arguments of environments from what `plain` made of them."""
+    version = {"version": version_named(str(written["version"]))} if "version" in written else {}
+    return {**written, **version}
+
+
 def keywords_of(policy: Policy) -> dict[str, Any]:
     """Keyword arguments of the environments that a policy flies in, as `action_of` needs them.
 
@@ -40,9 +46,7 @@ def keywords_of(policy: Policy) -> dict[str, Any]:
     network = policy.description.network
     if not isinstance(network, Actor):
         raise ValueError(f"network.kind is {network.kind!r}, not 'actor'")
-    keywords: dict[str, Any] = dict(network.environment)
-    if "version" in keywords:
-        keywords["version"] = version_named(str(keywords["version"]))
+    keywords = as_given(network.environment)
     settings = MissionSettings.of(keywords)
     if settings.chooses:
         keywords["mask_in_observation"] = True

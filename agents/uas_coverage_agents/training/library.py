@@ -11,7 +11,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.logger import KVWriter, Logger
 from stable_baselines3.common.vec_env import VecEnv
 
-from uas_coverage_agents.policy.environment import observed
+from uas_coverage_agents.policy.environment import observed, plain
 from uas_coverage_agents.policy.library import Library
 from uas_coverage_agents.training.central_critic import CentralCriticPolicy
 from uas_coverage_agents.training.learner import Arrays, Learned, Told
@@ -82,7 +82,7 @@ class LibraryLearner:
             inputs=observation.size,
             tensors={name: tensor.shape for name, tensor in tensors.items()},
             room=tuple(self._room),
-            environment=dict(self._chosen),
+            environment=plain(self._chosen),
         )
         return Learned("environment", network, observation, tensors)
 

@@ -8,6 +8,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from uas_coverage_agents.policy import Policy
+from uas_coverage_agents.policy.environment import as_given
 from uas_coverage_agents.policy.library import Library
 from uas_coverage_agents.training.library import env_of, keywords_of, model_of, observed
 from uas_coverage_agents.training.settings import (
@@ -51,7 +52,7 @@ class EnvironmentRunner:
                 f"add --option trust=true if you trust it"
             )
         room = Room(*network.room)
-        keywords = keywords_of(settings, network.environment, room)
+        keywords = keywords_of(settings, as_given(network.environment), room)
         if not policy.description.observation.has_the_numbers_of(observed(keywords)):
             raise ValueError("its observation is not that of this version; train it anew")
         self.model = _model(policy, settings, keywords, room)
