@@ -232,8 +232,8 @@ def measure(
             if _group(case) != group:
                 continue
             try:
-                other = case.peer == AGAINST
-                process = CaseProcess(case, against if other else python_of(case.peer, cache))
+                other = against if case.peer == AGAINST else None
+                process = CaseProcess(case, other or python_of(case.peer, cache))
                 processes.append(process)
                 process.answer()
                 # the first turn is not kept: it finds how many steps a turn has

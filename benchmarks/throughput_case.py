@@ -132,7 +132,8 @@ def _of(draw: Callable[[Any], Any]) -> list[Any]:
 def _streets(num_envs: int, threads: int) -> Steps:
     from uas_coverage_env.tasks.levels import LEVELS
 
-    (streets,) = (each for each in LEVELS["medium"].families if each.name == "streets")
+    families = LEVELS["medium"].families
+    (streets,) = (each for each in families if each.draw.__name__ == "streets")
     return _batch(num_envs, threads, scenario=_of(streets))
 
 

@@ -6,7 +6,7 @@ turns with the first: both must come to the same, and their times can be compare
 """
 
 import time
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable
 
 import numpy as np
@@ -36,7 +36,7 @@ _STAGES = {
 _N_EMPTY = 1000
 
 
-def _timed(name: str, seconds: Counter[str], kernel: Callable[..., int], *given: object) -> int:
+def _timed(name: str, seconds: defaultdict[str, float], kernel: Callable[..., int], *given: object) -> int:
     start_s = time.process_time()
     answer = kernel(*given)
     seconds[name] += time.process_time() - start_s
@@ -63,13 +63,13 @@ class _Parts:
 
     def _cost_of_clock(self) -> float:
         """What it takes to call a part that has nothing to do, between two looks at the clock."""
-        seconds: Counter[str] = Counter()
+        seconds: defaultdict[str, float] = defaultdict(float)
         loop, flown = self._parts.loops[0], np.zeros(1, np.int64)
         for _ in range(_N_EMPTY):
             _timed("none", seconds, loop, self._given, flown, 0, 0, self.observation)
         return seconds["none"] / _N_EMPTY
 
-    def step(self, actions: np.ndarray, seconds: Counter[str]) -> None:
+    def step(self, actions: np.ndarray, seconds: defaultdict[str, float]) -> None:
         """One step; adds what its parts took."""
         lanes = self.batch.lanes
         self.batch.learners.asked[...] = actions
@@ -104,7 +104,7 @@ def nanoseconds(repeats: int, n_lanes: int) -> dict[str, float]:
     taken: dict[str, list[float]] = {}
     for step in range(N_STEPS + repeats):
         actions = rng.uniform(-1, 1, shape).astype(np.float32)
-        seconds: Counter[str] = Counter()
+        seconds: defaultdict[str, float] = defaultdict(float)
         flying = int(whole.flying[whole.lanes.orders == FLY].sum())
         start_s = time.process_time()
         whole.step(actions)

@@ -135,9 +135,9 @@ class CoverageBatch:
         self._begun = False
         # `_draw_next` comes between the end of a mission and the next
         begins_later = self._begins_here and self.autoreset == SAME_STEP
-        autoreset = DISABLED if begins_later else self.autoreset
+        ends = DISABLED if begins_later else self.autoreset
         self.call = BatchCall(
-            self.settings, self.pool, self.missions, self._observing, autoreset, int(threads)
+            self.settings, self.pool, self.missions, self._observing, ends, int(threads)
         )
 
     @property
