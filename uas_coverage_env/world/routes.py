@@ -111,16 +111,21 @@ def crossing(obstacle, normals, offsets_m, x0, y0, x1, y1):
 
 
 @kernel
-def first_between(obstacles, normals, offsets_m, x0, y0, x1, y1):
-    """The first tall obstacle between two places; -1 where there is none.
+def hides(obstacle, normals, offsets_m, x0, y0, x1, y1):
+    """Whether a tall obstacle lies between two places.
 
-    Obstacles above which the leg starts or ends do not count: it has to pass over them anyway.
+    Not where the leg starts or ends above it: it has to pass over it anyway.
     """
+    at, over, _ = crossing(obstacle, normals, offsets_m, x0, y0, x1, y1)
+    return at <= 1.0 and not over
+
+
+@kernel
+def first_between(obstacles, normals, offsets_m, x0, y0, x1, y1):
+    """The first tall obstacle that hides one place from another; -1 where none does."""
     for o in range(obstacles.shape[0]):
-        if obstacles[o].tall:
-            at, over, _ = crossing(obstacles[o], normals, offsets_m, x0, y0, x1, y1)
-            if at <= 1.0 and not over:
-                return o
+        if obstacles[o].tall and hides(obstacles[o], normals, offsets_m, x0, y0, x1, y1):
+            return o
     return -1
 
 
@@ -384,7 +389,6 @@ def write_between(obstacles, normals, offsets_m, x0, y0, x1, y1, n, between):
         while bits != 0:
             c = lowest_bit(bits)
             bits &= bits - 1
-            at, over, _ = crossing(obstacles[o], normals, offsets_m, x0, y0, x1[c], y1[c])
-            if at <= 1.0 and not over:
+            if hides(obstacles[o], normals, offsets_m, x0, y0, x1[c], y1[c]):
                 between[c] = o
                 left &= ~(1 << c)
