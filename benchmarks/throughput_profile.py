@@ -36,7 +36,9 @@ _STAGES = {
 _N_EMPTY = 1000
 
 
-def _timed(name: str, seconds: defaultdict[str, float], kernel: Callable[..., int], *given: object) -> int:
+def _timed(
+    name: str, seconds: defaultdict[str, float], kernel: Callable[..., int], *given: object
+) -> int:
     start_s = time.process_time()
     answer = kernel(*given)
     seconds[name] += time.process_time() - start_s
