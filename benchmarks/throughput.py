@@ -2,6 +2,7 @@
 
     python benchmarks/throughput.py                          ours alone
     python benchmarks/throughput.py --peers all --cache DIR  beside mpe2, VMAS and JaxMARL
+    python benchmarks/throughput.py --against PYTHON --drawn beside another version of ours
     python benchmarks/throughput.py --threads 1,2 --json FILE
     python benchmarks/throughput.py --cuda --envs 1024,16384,131072     on a GPU too
     python benchmarks/throughput.py --profile                where the time of our step goes
@@ -14,6 +15,7 @@ obstacles over 1 s): the ratios say what a learner waits for, not who computes b
 """
 
 import json
+import shutil
 import statistics
 import subprocess
 import sys
@@ -36,6 +38,17 @@ PEERS = {
 """What pip installs for each."""
 
 VECTOR_PEERS = ("vmas", "jaxmarl")
+
+AGAINST = "against"
+"""In place of the name of a library: ours as another interpreter has it."""
+
+DRAWN = ("generated", "streets", "hard", "own-scenes")
+"""Cases of missions that are drawn, `hard` with its assistants, measured with DRAWN_ENVS each."""
+
+DRAWN_ENVS = 1024
+
+PROFILED, STEPS_A_TURN = 256, 40
+"""Missions of `--profile`, unless one number is given, and how many of their steps a turn is."""
 
 SYNC_ENVS = 64
 """So many single environments stand for the naive way, `SyncVectorEnv`."""
@@ -75,7 +88,7 @@ class CaseFailedError(Exception):
 class CaseProcess:
     """The process of a case."""
 
-    def __init__(self, case: Case, python: Path) -> None:
+    def __init__(self, case: Case, python: str | Path) -> None:
         self.case = case
         command = [python, CASE_PROGRAM, case.name, str(case.num_envs), str(case.threads)]
         self._process = subprocess.Popen(
@@ -117,9 +130,24 @@ class CaseProcess:
 
 
 def cases_of(
-    envs: list[int], threads: list[int], peers: list[str], cuda: bool = False
+    envs: list[int],
+    threads: list[int],
+    peers: list[str],
+    *,
+    cuda: bool = False,
+    drawn: bool = False,
+    against: bool = False,
 ) -> list[Case]:
-    """What is measured: dictionaries on one thread, the vector environments on each number."""
+    """What is measured: dictionaries on one thread, the vector environments on each number.
+
+    Args:
+        envs: Numbers of environments.
+        threads: Numbers of threads.
+        peers: Libraries.
+        cuda: On the GPU too.
+        drawn: Those of `DRAWN` too.
+        against: Each of ours a second time, for another interpreter.
+    """
     cases = [Case("village-dict", 1, 1)]
     if "mpe2" in peers:
         cases.append(Case("mpe2-dict", 1, 1, "mpe2"))
@@ -131,8 +159,13 @@ def cases_of(
             cases += [
                 Case(peer, num_envs, n_threads, peer) for peer in peers if peer in VECTOR_PEERS
             ]
+        if drawn:
+            cases += [Case(name, DRAWN_ENVS, n_threads) for name in DRAWN]
     if cuda:
         cases += [Case("village-cuda", num_envs, 1) for num_envs in envs]
+    if against:
+        ours = [case for case in cases if case.peer is None]
+        cases += [Case(case.name, case.num_envs, case.threads, AGAINST) for case in ours]
     return cases
 
 
@@ -163,25 +196,44 @@ def python_of(peer: str | None, cache: Path) -> Path:
     return python
 
 
+def _group(case: Case) -> tuple[str, int, int]:
+    """Cases of missions that are drawn are compared by themselves, the others by their numbers."""
+    return case.name if case.name in DRAWN else "", case.num_envs, case.threads
+
+
 def measure(
-    cases: list[Case], turns: int, seconds: float, cache: Path, clock: str
+    cases: list[Case],
+    turns: int,
+    seconds: float,
+    cache: Path,
+    clock: str,
+    against: str | None = None,
 ) -> list[tuple[Case, str]]:
     """Let all cases take turns; what they did is in them.
 
-    A group of cases that are compared (same numbers of environments and threads) takes its turns
-    together: not more processes are kept in memory than that.
+    A group of cases that are compared (`_group`) takes its turns together: not more processes are
+    kept in memory than that.
+
+    Args:
+        cases: These.
+        turns: Of each.
+        seconds: Length of a turn.
+        cache: Folder of the virtual environments of peers.
+        clock: "wall" or "cpu".
+        against: The other interpreter.
 
     Returns:
         The cases that failed, and why.
     """
     failed: list[tuple[Case, str]] = []
-    for group in dict.fromkeys((case.num_envs, case.threads) for case in cases):
+    for group in dict.fromkeys(map(_group, cases)):
         processes: list[CaseProcess] = []
         for case in cases:
-            if (case.num_envs, case.threads) != group:
+            if _group(case) != group:
                 continue
             try:
-                process = CaseProcess(case, python_of(case.peer, cache))
+                other = against if case.peer == AGAINST else None
+                process = CaseProcess(case, other or python_of(case.peer, cache))
                 processes.append(process)
                 process.answer()
                 # the first turn is not kept: it finds how many steps a turn has
@@ -192,8 +244,9 @@ def measure(
                 failed.append((case, str(error)))
         lost = [case for case, _ in failed]
         alive = [process for process in processes if process.case not in lost]
-        for _ in range(turns):
-            for process in alive:
+        for turn in range(turns):
+            # the other way round in every second turn: none always follows the same one
+            for process in alive[:: 1 if turn % 2 == 0 else -1]:
                 process.play(seconds, clock)
         for process in processes:
             process.close()
@@ -228,7 +281,8 @@ def ratios(case: Case, cases: list[Case], counted: str = "rates") -> dict[str, l
         if other.peer is not None
         and other.rates
         and case.name.endswith("-dict") == other.name.endswith("-dict")
-        and (other.num_envs, other.threads) == (case.num_envs, case.threads)
+        and (other.name == case.name or other.peer != AGAINST)
+        and _group(other) == _group(case)
     }
 
 
@@ -247,7 +301,8 @@ def table_of(cases: list[Case]) -> Table:
         if not case.rates:
             continue
         table.add_row(
-            case.name, str(case.num_envs), str(case.threads),
+            f"{case.name} ({AGAINST})" if case.peer == AGAINST else case.name,
+            str(case.num_envs), str(case.threads),
             _thousands(case.rates), _thousands(case.row_rates),
             *(_beside(case, cases, counted) for counted in ("rates", "row_rates")),
             f"{case.peak_mb:.0f}",
@@ -270,6 +325,12 @@ def main(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="Also write what was measured.")
     ] = None,
+    against: Annotated[
+        str | None, typer.Option(help="Ours also with this Python, which has another version.")
+    ] = None,
+    drawn: Annotated[
+        bool, typer.Option("--drawn", help=f"Missions that are drawn too, {DRAWN_ENVS} at once.")
+    ] = False,
     cuda: Annotated[bool, typer.Option("--cuda", help="On the GPU of this machine too.")] = False,
     profile: Annotated[
         bool, typer.Option("--profile", help="Only show where the time of our step goes.")
@@ -280,10 +341,14 @@ def main(
         # only here: it compiles what it measures
         from throughput_profile import profile_table
 
-        console.print(profile_table(turns))
+        n_lanes = int(envs) if envs.isdecimal() else PROFILED
+        console.print(profile_table(turns * STEPS_A_TURN, n_lanes))
         return
     chosen = {"none": [], "all": list(PEERS)}.get(peers, peers.split(","))
     unknown = [peer for peer in chosen if peer not in PEERS]
+    if against is not None and shutil.which(against) is None:
+        console.print(f"there is no program {against!r}; give the Python of an environment")
+        raise typer.Exit(2)
     if unknown or clock not in ("wall", "cpu"):
         wrong = f"peer {unknown[0]!r}" if unknown else f"clock {clock!r}"
         console.print(
@@ -291,8 +356,8 @@ def main(
         )
         raise typer.Exit(2)
     n_envs, n_threads = ([int(part) for part in text.split(",")] for text in (envs, threads))
-    cases = cases_of(n_envs, n_threads, chosen, cuda)
-    failed = measure(cases, turns, seconds, cache, clock)
+    cases = cases_of(n_envs, n_threads, chosen, cuda=cuda, drawn=drawn, against=against is not None)
+    failed = measure(cases, turns, seconds, cache, clock, against)
     console.print(table_of(cases))
     for _, why in failed:
         console.print(f"failed: {why}", markup=False)

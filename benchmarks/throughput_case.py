@@ -22,6 +22,8 @@ from typing import Any
 N_DRAWN = 32
 N_ON_GPU = 4
 N_AGENTS = 2
+N_SCENARIOS = 64
+"""So many are drawn, before the clock starts, from which the missions of a batch are drawn."""
 
 Steps = Callable[[int], Callable[[], tuple[float, float]]]
 """Steps so many times; what it returns counts agent-steps and rows, when the clock has stopped."""
@@ -70,7 +72,7 @@ def _village_dict(num_envs: int, threads: int) -> Steps:
     return _parallel(uas_coverage_v0.parallel_env())
 
 
-def _vector(env: Any, count: Callable[[dict[str, Any]], float]) -> Steps:
+def _vector(env: Any, count: Callable[[dict[str, Any]], float], rows: int) -> Steps:
     """A Gymnasium vector environment whose infos tell which UAS fly."""
     latest = env.reset(seed=0)[1]
     env.action_space.seed(0)
@@ -82,12 +84,12 @@ def _vector(env: Any, count: Callable[[dict[str, Any]], float]) -> Steps:
         for step in range(n_steps):
             infos.append(latest)
             *_, latest = env.step(drawn[step % N_DRAWN])
-        return lambda: (sum(map(count, infos)), n_steps * env.num_envs * N_AGENTS)
+        return lambda: (sum(map(count, infos)), n_steps * rows)
 
     return steps
 
 
-def _village(num_envs: int, threads: int) -> Steps:
+def _batch(num_envs: int, threads: int, **settings: Any) -> Steps:
     import gymnasium
 
     import uas_coverage_env  # noqa: F401  # registers the names
@@ -98,8 +100,48 @@ def _village(num_envs: int, threads: int) -> Steps:
         vectorization_mode="vector_entry_point",
         threads=threads,
         copy=False,
+        **settings,
     )
-    return _vector(env, lambda infos: float((infos["status"] == 0).sum()))
+    _, infos = env.reset(seed=0)
+    return _vector(env, lambda infos: float((infos["status"] == 0).sum()), infos["status"].size)
+
+
+def _village(num_envs: int, threads: int) -> Steps:
+    return _batch(num_envs, threads)
+
+
+def _generated(num_envs: int, threads: int) -> Steps:
+    from uas_coverage_env import generate_scenario
+
+    return _batch(num_envs, threads, scenario=[generate_scenario(k) for k in range(N_SCENARIOS)])
+
+
+def _own_scenes(num_envs: int, threads: int) -> Steps:
+    """As many scenarios as missions: few fly in the same one."""
+    from uas_coverage_env import generate_scenario
+
+    return _batch(num_envs, threads, scenario=[generate_scenario(k) for k in range(num_envs)])
+
+
+def _of(draw: Callable[[Any], Any]) -> list[Any]:
+    import numpy as np
+
+    return [draw(np.random.default_rng(k)) for k in range(N_SCENARIOS)]
+
+
+def _streets(num_envs: int, threads: int) -> Steps:
+    from uas_coverage_env.tasks.levels import LEVELS
+
+    families = LEVELS["medium"].families
+    (streets,) = (each for each in families if each.draw.__name__ == "streets")
+    return _batch(num_envs, threads, scenario=_of(streets))
+
+
+def _hard(num_envs: int, threads: int) -> Steps:
+    from uas_coverage_env.tasks.levels import LEVELS
+
+    scenarios = _of(LEVELS["hard"].missions("training").generator)
+    return _batch(num_envs, threads, scenario=scenarios, return_mode=True, safety_filter=True)
 
 
 def _village_sync(num_envs: int, threads: int) -> Steps:
@@ -113,7 +155,7 @@ def _village_sync(num_envs: int, threads: int) -> Steps:
         fleet = (uas for name, uas in infos["uas"].items() if not name.startswith("_"))
         return float(sum((uas["status"] == 0).sum() for uas in fleet))
 
-    return _vector(env, flying)
+    return _vector(env, flying, num_envs * N_AGENTS)
 
 
 def _village_cuda(num_envs: int, threads: int) -> Steps:
@@ -215,6 +257,10 @@ CASES: dict[str, Callable[[int, int], Steps]] = {
     "village-dict": _village_dict,
     "village-sync": _village_sync,
     "village": _village,
+    "generated": _generated,
+    "streets": _streets,
+    "hard": _hard,
+    "own-scenes": _own_scenes,
     "village-cuda": _village_cuda,
     "mpe2-dict": _mpe2_dict,
     "vmas": _vmas,

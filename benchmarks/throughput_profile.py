@@ -1,242 +1,130 @@
-"""Where the time of a step goes: its parts timed one by one, in compiled loops over many lanes.
+"""Where the time of a step goes: the parts of the real step of a batch, timed one by one.
 
-Each part runs over the states that random missions in the village have come to, as it would in a
-step, and does again what it has just done. Taken apart, the parts share less of what is in cache
-and in registers, and every loop costs a little: their sum is not exactly the whole.
+Each block of lanes goes through the parts that the compiled step calls (`BlockParts`), called from
+Python with a clock between them. A second batch flies the same missions by the step itself, in
+turns with the first: both must come to the same, and their times can be compared.
 """
 
 import time
+from collections import defaultdict
 from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from rich.table import Table
 
-from uas_coverage_env.autopilot.control import command_wrench
-from uas_coverage_env.compiled.views import lane_view, rows_view, slice_view
-from uas_coverage_env.entities.state import FLYING
 from uas_coverage_env.env import CoverageBatch
-from uas_coverage_env.env.batch.pool import learners_of, tables_at
-from uas_coverage_env.env.episode.act import acting_of, write_commands_with
-from uas_coverage_env.env.episode.memory import SCRATCH, Learners, Scratch
-from uas_coverage_env.env.episode.observe import noted, observe_one_with, observing_of
-from uas_coverage_env.env.episode.pay import compute_rewards_with, paying_of
-from uas_coverage_env.env.episode.step import Rules, step_learners_with
-from uas_coverage_env.env.observation import OBSERVATION_SIZE, ObservationBlock
-from uas_coverage_env.env.observation.nearest import nearest_waypoints
+from uas_coverage_env.env.batch.kernel import block_parts_with
+from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP, lanes_at_once
+from uas_coverage_env.env.episode.observe import blocks_of_looks
+from uas_coverage_env.env.episode.step import stages_with
 from uas_coverage_env.env.versions import V0
-from uas_coverage_env.simulation.flight import feature_code
-from uas_coverage_env.simulation.pool import arena_of, state_of
-from uas_coverage_env.simulation.step import advance
-from uas_coverage_env.vehicle import lpv_step
-from uas_coverage_env.vehicle.layout import N_STATES
-from uas_coverage_env.world.arena import ARENA
-from uas_coverage_env.world.contacts import (
-    check_fence_and_battery,
-    check_limits,
-    check_obstacles,
-    check_separation,
-    count_breaches,
-)
-from uas_coverage_env.world.coverage import cover, land
 
-N_LANES = 256
 N_STEPS = 60
-WHOLE = "the whole step"
+"""Flown before the clock starts."""
 
-_scratch_of = lane_view(SCRATCH, sized_by=ARENA)
+WHOLE, SUM = "the whole step", "sum of its parts"
 
-compiled = njit(error_model="numpy")
-
-NO_ASSISTANTS = np.zeros(0, np.int64)
-"""No assistants."""
-
-write_commands = write_commands_with(V0.actions)
-compute_rewards = compute_rewards_with(V0.reward)
-observe_one = observe_one_with(V0.observation)
-step_learners = step_learners_with(V0)
-
-
-class View(NamedTuple):
-    """What `step_learners` needs of one lane."""
-
-    learners: Learners
-    scratch: Scratch
-
-
-@compiled
-def _whole(arena, state, tables, view, rules, spare, row):
-    step_learners(arena, state, tables, view.learners, view.scratch, rules, False, row)
-
-
-@compiled
-def _world(arena, state, tables, view, rules, spare, row):
-    advance(arena, state, view.scratch.commands, False, NO_ASSISTANTS, None, view.scratch.outcome)
-
-
-@compiled
-def _observation(arena, state, tables, view, rules, spare, row):
-    for i in range(state.uas.shape[0]):
-        if state.uas[i].status == FLYING:
-            observe_one(arena, state, tables, view.learners, rules.observing, i, row[i])
-
-
-@compiled
-def _actions(arena, state, tables, view, rules, spare, row):
-    write_commands(arena, state, tables, view.learners, view.scratch, rules.acting)
-
-
-@compiled
-def _inner_loop(arena, state, tables, view, rules, spare, row):
-    for i in range(state.uas.shape[0]):
-        if state.uas[i].status == FLYING:
-            command = view.scratch.commands[i]
-            reference = state.uas[i].reference_mps[:]
-            command_wrench(arena.vehicles[i], state.x[i], reference, command, spare)
-
-
-@compiled
-def _model(arena, state, tables, view, rules, spare, row):
-    for i in range(state.uas.shape[0]):
-        if state.uas[i].status == FLYING:
-            lpv_step(arena.vehicles[i], state.x[i], view.scratch.outcome[i].u, spare)
-
-
-@compiled
-def _obstacles(arena, state, tables, view, rules, spare, row):
-    check_obstacles(arena, state, view.scratch.outcome)
-
-
-@compiled
-def _other_contacts(arena, state, tables, view, rules, spare, row):
-    check_separation(arena, state, view.scratch.outcome)
-    check_fence_and_battery(arena, state, view.scratch.outcome)
-    count_breaches(arena, state, view.scratch.outcome)
-    check_limits(arena, state, False, view.scratch.outcome)
-
-
-@compiled
-def _coverage(arena, state, tables, view, rules, spare, row):
-    cover(arena, state, state.step[0] + 1, view.scratch.outcome)
-    land(arena, state, view.scratch.outcome)
-
-
-@compiled
-def _reward(arena, state, tables, view, rules, spare, row):
-    compute_rewards(arena, state, tables, view.learners, view.scratch, rules.paying)
-
-
-@compiled
-def _nearest(arena, state, tables, view, rules, spare, row):
-    for i in range(state.uas.shape[0]):
-        if state.uas[i].status == FLYING:
-            nearest_waypoints(arena, state, i, view.learners.candidates[i])
-
-
-def _block(block: ObservationBlock, column: int) -> Any:
-    """A block, with what it needs that no block before it has noted."""
-    notes = tuple(set(block.needs) - _noted)
-    _noted.update(notes)
-    write, size, note = block.write, block.size, noted(notes)
-
-    @compiled
-    def write_block(arena, state, tables, view, rules, spare, row):
-        for i in range(state.uas.shape[0]):
-            if state.uas[i].status == FLYING:
-                note(arena, state, tables, view.learners, i)
-                columns = slice_view(row[i], column, size)
-                write(arena, state, tables, view.learners, i, rules.observing.parameters, columns)
-
-    return write_block
-
-
-_noted: set[Any] = set()
-_columns = np.cumsum([0, *(block.size for block in V0.observation)]).tolist()
-
-PARTS: dict[str, Callable[..., None]] = {
-    "actions into commands": _actions,
-    "inner loop": _inner_loop,
-    "LPV model and battery": _model,
-    "contacts with obstacles": _obstacles,
-    "other contacts and breaches": _other_contacts,
-    "coverage and landing": _coverage,
-    "reward": _reward,
-    "observation: nearest waypoints": _nearest,
-    **{
-        f"observation: {block.name.replace('_', ' ')}": _block(block, column)
-        for block, column in zip(V0.observation, _columns, strict=False)
-    },
-    "the whole observation": _observation,
-    "the whole world": _world,
-    WHOLE: _whole,
+_STAGES = {
+    "act": "actions into commands",
+    "move": "inner loop, model, battery",
+    "meet": "contacts with obstacles",
+    "judge": "other contacts, breaches, coverage, landing",
+    "pay": "reward and report",
 }
-"""In the order in which they are timed, each from the same states."""
 
 
-def _over_lanes(timed: Any) -> Callable[..., None]:
-    # part of the loop, as it is part of a step: to call it with a hundred words takes as long
-    timed = njit(error_model="numpy", forceinline=True)(timed.py_func)
+_N_EMPTY = 1000
 
-    @compiled
-    def run(pool, missions, scratch, rules, spare, observation):
-        arena = arena_of(pool.arenas, 0)
-        tables = tables_at(pool.tables, 0)
-        n_uas = arena.uas.shape[0]
-        for lane in range(observation.shape[0]):
-            state = state_of(missions.worlds, lane, pool.arenas, 0)
-            # views that count no references, as in the batch
-            view = View(
-                learners_of(missions.learners, lane, pool.arenas, 0),
-                _scratch_of(scratch, lane, pool.arenas, 0),
+
+def _timed(
+    name: str, seconds: defaultdict[str, float], kernel: Callable[..., int], *given: object
+) -> int:
+    start_s = time.process_time()
+    answer = kernel(*given)
+    seconds[name] += time.process_time() - start_s
+    return answer
+
+
+class _Parts:
+    """A batch whose blocks of lanes are led through the parts of a step."""
+
+    def __init__(self, n_lanes: int) -> None:
+        self.batch = batch = CoverageBatch(n_lanes)
+        self.observation = batch.reset(0)
+        self._before = np.zeros_like(self.observation)
+        batch.missions.settled[:] = False
+        self._given = batch.call.numbers
+        self._n = lanes_at_once(n_lanes, batch.n_uas, 1)
+        self._parts = block_parts_with(V0, self.observation.shape[2])
+        blocks = blocks_of_looks(V0.observation)
+        looks = ["nearest waypoints", *(", ".join(each.name for each in group) for group in blocks)]
+        names = [_STAGES[stage.__name__] for stage in stages_with(V0).flight]
+        names += [f"observation: {name.replace('_', ' ')}" for name in looks]
+        self._loops = dict(zip(names, self._parts.loops, strict=True))
+        self._clock_s = self._cost_of_clock()
+
+    def _cost_of_clock(self) -> float:
+        """What it takes to call a part that has nothing to do, between two looks at the clock."""
+        seconds: defaultdict[str, float] = defaultdict(float)
+        loop, flown = self._parts.loops[0], np.zeros(1, np.int64)
+        for _ in range(_N_EMPTY):
+            _timed("none", seconds, loop, self._given, flown, 0, 0, self.observation)
+        return seconds["none"] / _N_EMPTY
+
+    def step(self, actions: np.ndarray, seconds: defaultdict[str, float]) -> None:
+        """One step; adds what its parts took."""
+        lanes = self.batch.lanes
+        self.batch.learners.asked[...] = actions
+        self._before, self.observation = self.observation, self._before
+        arrays = self._before, self.observation
+        by_scene, flown = np.arange(len(actions)), np.zeros(self._n, np.int64)
+
+        def timed(name: str, kernel: Callable[..., int], *given: object) -> int:
+            seconds[name] -= self._clock_s
+            return _timed(name, seconds, kernel, *given)
+
+        for first in range(0, len(actions), self._n):
+            block = self._given, lanes.orders, by_scene, first, min(self._n, len(actions) - first)
+            n_flown = timed(
+                "which lanes fly, what others saw last", self._parts.gather, *block, flown, *arrays
             )
-            row = rows_view(observation, lane, (n_uas, OBSERVATION_SIZE))
-            timed(arena, state, tables, view, rules, spare, row)
+            for name, loop in self._loops.items():
+                timed(name, loop, self._given, flown, n_flown, 0, self.observation)
+            timed("sums, ends, new missions", self._parts.finish, *block, NEXT_STEP, *arrays)
 
-    return run
 
+def nanoseconds(repeats: int, n_lanes: int) -> dict[str, float]:
+    """Median time of each part per agent-step [ns], and of the whole step.
 
-def nanoseconds(repeats: int, n_lanes: int = N_LANES) -> dict[str, float]:
-    """Time of each part per agent-step, the quickest of some repeats [ns]."""
-    batch = CoverageBatch(n_lanes)
-    batch.reset(0)
+    Raises:
+        AssertionError: What the parts have come to is not what the step has come to.
+    """
+    whole, parts = CoverageBatch(n_lanes), _Parts(n_lanes)
+    whole.reset(0)
     rng = np.random.default_rng(0)
-    shape = batch.learners.asked.shape
-    for _ in range(N_STEPS):
-        batch.step(rng.uniform(-1, 1, shape).astype(np.float32))
-    paying = paying_of(V0.reward, np.ones(len(V0.reward)), V0.reward)
-    acting = acting_of(V0.actions[0], V0.actions)
-    observing = observing_of(V0.observation, V0.observation)
-    rules = Rules(
-        acting, False, NO_ASSISTANTS, feature_code((), otherwise=False), paying, observing
-    )
-    arguments: tuple[Any, ...] = (
-        batch.pool.arrays, batch.missions,
-        SCRATCH.zeros(batch.pool.sizes, lanes=n_lanes), rules, np.zeros(N_STATES),
-        batch.observation,
-    )  # fmt: skip
-    # once, so that there are outcomes for the parts to go on from
-    _over_lanes(PARTS[WHOLE])(*arguments)
-    result = {}
-    flying = int(batch.flying.sum())
-    kept = batch.worlds.copy()
-    for name, timed in PARTS.items():
-        run = _over_lanes(timed)
-        run(*arguments)
-        best_s = np.inf
-        for _ in range(repeats):
-            for array, before in zip(batch.worlds, kept, strict=True):
-                array[:] = before
-            start_s = time.process_time()
-            run(*arguments)
-            best_s = min(best_s, (time.process_time() - start_s) / flying)
-        result[name] = best_s * 1e9
-    return result
+    shape = whole.learners.asked.shape
+    taken: dict[str, list[float]] = {}
+    for step in range(N_STEPS + repeats):
+        actions = rng.uniform(-1, 1, shape).astype(np.float32)
+        seconds: defaultdict[str, float] = defaultdict(float)
+        flying = int(whole.flying[whole.lanes.orders == FLY].sum())
+        start_s = time.process_time()
+        whole.step(actions)
+        took_s = time.process_time() - start_s
+        parts.step(actions, seconds)
+        if step >= N_STEPS:
+            seconds[SUM] = sum(seconds.values())
+            seconds[WHOLE] = took_s
+            for name, each_s in seconds.items():
+                taken.setdefault(name, []).append(each_s / flying * 1e9)
+    assert np.array_equal(whole.observation, parts.observation)
+    assert np.array_equal(whole.lanes.rewards, parts.batch.lanes.rewards)
+    return {name: float(np.median(each)) for name, each in taken.items()}
 
 
-def profile_table(repeats: int) -> Table:
+def profile_table(repeats: int, n_lanes: int) -> Table:
     """The times as a table, with shares of the whole step."""
-    times_ns = nanoseconds(max(repeats, 60))
+    times_ns = nanoseconds(repeats, n_lanes)
     table = Table("part", "ns per agent-step", "share")
     for name, time_ns in times_ns.items():
         table.add_row(name, f"{time_ns:.0f}", f"{time_ns / times_ns[WHOLE]:.0%}")

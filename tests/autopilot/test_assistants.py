@@ -17,9 +17,10 @@ from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
 from uas_coverage_env.scenario import generate_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.simulation.flight import fly_still
-from uas_coverage_env.simulation.step import advance, begin_step, judge
+from uas_coverage_env.simulation.step import advance, begin_step, judge_contacts
 from uas_coverage_env.simulation.world import initial_state
 from uas_coverage_env.world import WorldState, build_arena
+from uas_coverage_env.world.contacts import check_obstacles
 
 SCENARIO = generate_scenario(3, n_uas=3, n_waypoints=20, n_obstacles=10)
 
@@ -57,7 +58,8 @@ def test_what_lies_at_the_addresses_does_what_the_functions_do():
         steer(arena, direct, False, expected)
         filter_commands(arena, direct, False, expected)
         fly_still(arena, direct, expected)
-        judge(arena, direct, False, expected)
+        check_obstacles(arena, direct, expected)
+        judge_contacts(arena, direct, False, expected)
         assert outcome.tobytes() == expected.tobytes()
         for left, right in zip(called, direct, strict=True):
             assert np.array_equal(left, right)

@@ -20,7 +20,7 @@ from new_process import in_new_process
 from uas_coverage_env.compiled import digest
 from uas_coverage_env.compiled.internals import KernelDispatcher
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
-from uas_coverage_env.env.batch.kernel import step_batch, step_batch_in_threads, step_lane_with
+from uas_coverage_env.env.batch.kernel import step_batch, step_batch_in_threads, step_block_with
 from uas_coverage_env.env.episode.step import step_episode_with
 from uas_coverage_env.env.versions import V0, V1
 
@@ -345,8 +345,8 @@ def test_what_an_object_has_computed_since_makes_no_other_kernel():
 
 @pytest.mark.parametrize("version", [V0, V1], ids=lambda version: version.name)
 def test_the_steps_of_all_environments_are_kept_on_disk(version):
-    alone, lane = step_episode_with(version), step_lane_with(version)
-    for step in (alone, lane, step_batch, step_batch_in_threads):
+    alone, block = step_episode_with(version), step_block_with(version, 234)
+    for step in (alone, block, step_batch, step_batch_in_threads):
         assert digest.digest_of(step), step
 
 

@@ -6,10 +6,11 @@ import pytest
 from gymnasium.error import ResetNeeded
 from practice_grounds import practice_ground, with_roles
 
-from uas_coverage_env.entities.state import FLYING, LOST
+from uas_coverage_env.entities.state import ABSENT, FLYING, LOST
 from uas_coverage_env.env import CoverageBatch, CoverageParallelEnv
 from uas_coverage_env.env.actions.kinds import ACTION_NAMES
-from uas_coverage_env.env.batch.kernel import ABSENT, drawn
+from uas_coverage_env.env.batch.lane import drawn
+from uas_coverage_env.env.batch.memory import UAS_AT_ONCE, lanes_at_once
 from uas_coverage_env.env.batch.pool import ScenarioPool
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.report import CONTACT, ENERGY, FIRST_TERM, LIMITS, STATUS
@@ -29,6 +30,10 @@ MIXED = (
         ).model_copy(update={"min_height_m": 8.0, "from_ground": True})
     ),
 )
+
+
+LANES = 200
+"""More than fly at once: see `test_many_lanes_fly_in_blocks`."""
 
 
 def random_actions(batch, seed):
@@ -119,25 +124,41 @@ def flown(num_envs, seed, threads=1):
     rng = np.random.default_rng(0)
     for _ in range(30):
         # the same actions for the same lanes, however many there are
-        actions = rng.uniform(-1, 1, (16, 3, 3))
+        actions = rng.uniform(-1, 1, (LANES, 3, 3))
         batch.step(actions[seed : seed + num_envs])
     return batch.state_dict()
 
 
-def test_a_mission_does_not_depend_on_the_lanes_beside_it():
-    together = flown(8, 0)
+@pytest.mark.parametrize("num_envs", [8, LANES])
+def test_a_mission_does_not_depend_on_the_lanes_beside_it(num_envs):
+    together = flown(num_envs, 0)
     assert (together["mission"] > 0).all()
     assert len(set(together["scenario"].tolist())) > 1
-    for lane in range(0, 8, 3):
+    for lane in range(0, num_envs, 3 if num_envs == 8 else 18):
         alone = flown(1, lane)
         for name, array in alone.items():
             np.testing.assert_array_equal(array[0], together[name][lane])
 
 
+def test_many_lanes_fly_in_blocks():
+    assert 1 < LANES / lanes_at_once(LANES, n_uas=3, threads=1) < LANES
+    assert lanes_at_once(1024, n_uas=2, threads=1) == UAS_AT_ONCE / 2
+    # a fleet that is larger flies alone
+    assert lanes_at_once(4, n_uas=UAS_AT_ONCE + 1, threads=1) == 1
+
+
+@pytest.mark.parametrize("num_envs", [1, 2, 7, 64, 100_000])
+def test_threads_share_few_lanes_too(num_envs):
+    at_once = lanes_at_once(num_envs, n_uas=2, threads=2)
+    assert 1 <= at_once <= UAS_AT_ONCE / 2
+    assert -(-num_envs // at_once) >= min(num_envs, 4)
+
+
 @pytest.mark.skipif(numba.get_num_threads() == 1, reason="numba has one thread here")
-def test_two_threads_fly_the_missions_of_one():
-    together = flown(8, 0)
-    shared = flown(8, 0, threads=2)
+@pytest.mark.parametrize("num_envs", [8, LANES])
+def test_two_threads_fly_the_missions_of_one(num_envs):
+    together = flown(num_envs, 0)
+    shared = flown(num_envs, 0, threads=2)
     for name, array in together.items():
         np.testing.assert_array_equal(shared[name], array)
 

@@ -35,6 +35,23 @@ def world():
     return World(practice_ground(waypoints_m=tuple(grid), n_uas=1))
 
 
+def opened(world, n, n_open, rng):
+    """The world with n waypoints, of which some are open."""
+    uncovered = np.zeros(n, dtype=bool)
+    uncovered[rng.permutation(n)[:n_open]] = True
+    columns = np.ascontiguousarray(world.arena.waypoint_columns[:, :n])
+    arena = world.arena._replace(waypoint_columns=columns)
+    return arena, world.state._replace(uncovered=uncovered, x=world.state.x.copy())
+
+
+def sorted_from(arena, state):
+    """All open waypoints in order, the first of them."""
+    away_m2 = ((arena.waypoint_columns[:3].T - state.x[0, :3]) ** 2).sum(axis=1)
+    open_ones = np.flatnonzero(state.uncovered)
+    nearest = open_ones[np.lexsort((open_ones, away_m2[open_ones]))][:K_WAYPOINTS]
+    return [*nearest, *[-1] * (K_WAYPOINTS - len(nearest))]
+
+
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(
     n=st.integers(1, MANY),
@@ -50,21 +67,39 @@ def test_they_are_those_that_sorting_all_finds_and_of_two_equally_far_the_first(
     world, n, n_open, before, seed
 ):
     rng = np.random.default_rng(seed)
-    uncovered = np.zeros(n, dtype=bool)
-    uncovered[rng.permutation(n)[:n_open]] = True
-    columns = np.ascontiguousarray(world.arena.waypoint_columns[:, :n])
-    arena = world.arena._replace(waypoint_columns=columns)
-    state = world.state._replace(uncovered=uncovered, x=world.state.x.copy())
+    arena, state = opened(world, n, n_open, rng)
     state.x[0, :3] = 20.0 * rng.integers(0, 10), 10.0 * rng.integers(0, 20), -5.0
     # nothing twice but -1
     candidates = np.array([w if w not in before[:c] else -1 for c, w in enumerate(before)])
 
     find(arena, state, 0, candidates)
 
-    away_m2 = ((columns[:3].T - state.x[0, :3]) ** 2).sum(axis=1)
-    open_ones = np.flatnonzero(uncovered)
-    nearest = open_ones[np.lexsort((open_ones, away_m2[open_ones]))][:K_WAYPOINTS]
-    assert candidates.tolist() == [*nearest, *[-1] * (K_WAYPOINTS - len(nearest))]
+    assert candidates.tolist() == sorted_from(arena, state)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(
+    n=st.integers(10, MANY),
+    step_m=st.sampled_from([0.0, 0.1, 1.0, 5.0, 10.0, 60.0]),
+    exact=st.booleans(),
+    n_covered=st.sampled_from([0, 0, 0, 1, 5]),
+    seed=st.integers(0, 999),
+)
+def test_a_uas_on_its_way_keeps_them_in_order(world, n, step_m, exact, n_covered, seed):
+    rng = np.random.default_rng(seed)
+    arena, state = opened(world, n, rng.integers(K_WAYPOINTS - 2, n + 1), rng)
+    state.x[0, :3] = 20.0 * rng.integers(1, 9), 10.0 * rng.integers(1, 19), -5.0
+    if not exact:  # from the places above many are equally far away
+        state.x[0, :3] += rng.uniform(-10.0, 10.0, 3)
+    candidates = np.full(K_WAYPOINTS, -1)
+    find(arena, state, 0, candidates)
+    for _ in range(10):
+        state.x[0, :2] += step_m * rng.choice([-1.0, 0.0, 1.0], 2)
+        state.uncovered[rng.choice(candidates, n_covered)] = False
+
+        find(arena, state, 0, candidates)
+
+        assert candidates.tolist() == sorted_from(arena, state)
 
 
 @pytest.mark.parametrize("place", [0, 1, 31, 32, 62])

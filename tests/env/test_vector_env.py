@@ -11,8 +11,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from practice_grounds import practice_ground
 
 import uas_coverage_env  # noqa: F401  it registers the ids
+from uas_coverage_env.entities.state import ABSENT
 from uas_coverage_env.env import CoverageSwarmEnv, CoverageVectorEnv
-from uas_coverage_env.env.batch.kernel import ABSENT
 from uas_coverage_env.env.rendering.screen import Screen
 from uas_coverage_env.env.rewards.terms import REWARD_TERMS
 

@@ -61,6 +61,19 @@ allocating_kernel = _decorator(error_model="numpy", _nrt=True)
 numba's other options: `@allocating_kernel(parallel=True)`."""
 
 
+def in_turn(kernels: Sequence[Any], arguments: str) -> Any:
+    """A kernel that calls others, one after the other, each with all of its arguments.
+
+    Args:
+        kernels: These; numba has no loop for them.
+        arguments: Names, as in the head of a function.
+    """
+    known = {f"kernel_{k}": each for k, each in enumerate(kernels)}
+    calls = "; ".join(f"{name}({arguments})" for name in known)
+    exec(f"def run({arguments}):\n    {calls or 'pass'}", known)  # made of names alone
+    return inlined_kernel(known["run"])
+
+
 _LINE = 64
 """Bytes of a line of the cache."""
 
@@ -101,7 +114,12 @@ def stack_array_f32(size: int) -> NDArray[np.float32]:
     return np.empty(size, np.float32)
 
 
-def _on_the_stack(number: types.Float, element: ir.Type) -> Any:
+def stack_array_i64(size: int) -> NDArray[np.int64]:
+    """`stack_array` for whole numbers."""
+    return np.empty(size, np.int64)
+
+
+def _on_the_stack(number: types.Number, element: ir.Type) -> Any:
     def make(typing_context, size):
         if not isinstance(size, types.IntegerLiteral):
             return None
@@ -198,3 +216,4 @@ if COMPILED:
     lowest_bit, rarely, prefetch = made
     stack_array = _on_the_stack(types.float64, ir.DoubleType())
     stack_array_f32 = _on_the_stack(types.float32, ir.FloatType())
+    stack_array_i64 = _on_the_stack(types.int64, ir.IntType(64))

@@ -7,7 +7,7 @@ a module, since numba takes no attributes of objects.
 
 import ctypes
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -250,60 +250,59 @@ copy_arrays = _in_kernels(_copied, copy_arrays)
 
 
 class Handover:
-    """How the body of a parallel loop gets a tuple of tuples: numba hands it flat ones only.
+    """How kernels get many arrays in one array of numbers: to hand over each takes longer.
 
     Args:
-        example: Makes a tuple of the same type.
+        example: Makes a tuple of the same types: of arrays, int64 and such tuples.
 
     Attributes:
-        keep: In a kernel, (tuple) -> a number, good until the kernel returns.
-        take: In the body of its parallel loop, (number) -> the tuple, its arrays views.
+        take: In a kernel, (numbers) -> the tuple, its arrays views.
+        take_first: Likewise, the first member of the tuple alone, which compiles faster.
     """
 
     def __init__(self, example: Callable[[], Any]) -> None:
         self._example = example
         self._kept: dict[int, Any] = {}
-        self.keep = _in_kernels(self._typed_keep, self._plain_keep)
-        self.take = _in_kernels(self._typed_take, self._kept.__getitem__)
+        self.take = self._taking(lambda whole: whole)
+        self.take_first = self._taking(lambda whole: whole[0])
 
     @cached_property
     def _type(self) -> Any:
         return typeof(self._example())
 
-    def _plain_keep(self, value: Any) -> int:
-        self._kept.clear()
-        self._kept[id(value)] = value
-        return id(value)
+    def numbers_of(self, value: Any) -> NDArray[np.int64]:
+        """What `take` makes the tuple of; its arrays have to stay where they are.
 
-    def _typed_keep(self, typing_context, value):
-        if value != self._type:
-            raise TypeError(f"a parallel loop is handed {value}, not {self._type}")
+        Raises:
+            TypeError: It is of other types than the example.
+        """
+        if not COMPILED:
+            self._kept[id(value)] = value
+            return np.array([id(value)])
+        if typeof(value) != self._type:
+            raise TypeError(f"{typeof(value)} is handed over, not {self._type}")
+        return np.array(list(_numbers_of(value)), dtype=np.int64)
 
-        def generate(context, builder, signature, arguments):
-            owned_by_none = _without_owners(context, builder, value, arguments[0])
-            with builder.goto_entry_block():
-                place = builder.alloca(owned_by_none.type)
-            builder.store(owned_by_none, place)
-            return builder.ptrtoint(place, context.get_value_type(types.int64))
+    def _taking(self, part_of: Callable[[Any], Any]) -> Any:
+        def typed(typing_context, numbers):
+            kind = part_of(self._type)
 
-        return types.int64(value), generate
+            def generate(context, builder, signature, arguments):
+                at = parts_of(context, builder, numbers, arguments[0]).data
+                return builder.load(builder.bitcast(at, context.get_value_type(kind).as_pointer()))
 
-    def _typed_take(self, typing_context, number):
-        def generate(context, builder, signature, arguments):
-            kind = context.get_value_type(self._type).as_pointer()
-            return builder.load(builder.inttoptr(arguments[0], kind))
+            return kind(types.Array(types.int64, 1, "C")), generate
 
-        return self._type(types.int64), generate
+        return _in_kernels(typed, lambda numbers: part_of(self._kept[int(numbers[0])]))
 
 
-def _without_owners(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    """The same value, its arrays views: to count references to them would hold up all threads."""
-    if isinstance(kind, types.Array):
-        array = parts_of(context, builder, kind, value)
-        start = builder.bitcast(array.data, context.get_value_type(types.voidptr))
-        return array_at(context, builder, kind, start, array.shape)
-    parts: Any = kind if isinstance(kind, types.BaseTuple) else ()
-    for k, each in enumerate(parts):
-        part = _without_owners(context, builder, each, builder.extract_value(value, k))
-        value = builder.insert_value(value, part, k)
-    return value
+def _numbers_of(value: Any) -> Iterator[int]:
+    """The words of an array as numba has it in memory, owned by nothing; or a number."""
+    if isinstance(value, np.ndarray):
+        yield from (0, 0, value.size, value.itemsize, value.ctypes.data)
+        yield from (*value.shape, *value.strides)
+    elif isinstance(value, tuple):
+        for each in value:
+            yield from _numbers_of(each)
+    else:
+        yield value

@@ -7,12 +7,12 @@ from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.simulation.flight import fly, fly_otherwise_with
-from uas_coverage_env.simulation.step import advance_with
+from uas_coverage_env.simulation.step import WorldStages, stages_with
 
 
 @cache
-def advance_of(features: tuple[MissionFeature, ...], otherwise: bool) -> Any:
-    """`step.advance` with the kernels of features, to be called without assistants and code.
+def stages_on_gpu(features: tuple[MissionFeature, ...], otherwise: bool) -> WorldStages:
+    """The stages of `step.advance` with the kernels of features, without assistants and code.
 
     Args:
         features: In the order of `Arena.features`.
@@ -26,7 +26,7 @@ def advance_of(features: tuple[MissionFeature, ...], otherwise: bool) -> Any:
     )
     call_features = _in_turn(kernels)
     otherwise = otherwise or any(feature.disturbs for feature in features)
-    return advance_with(call_features, fly_otherwise_with(call_features) if otherwise else fly)
+    return stages_with(call_features, fly_otherwise_with(call_features) if otherwise else fly)
 
 
 def _in_turn(kernels: tuple[tuple[int, int, Any], ...]) -> Any:

@@ -1,7 +1,8 @@
 """One step of the world: the rules of the game."""
 
 import math
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
 
 from uas_coverage_env.autopilot.assist import assist
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
@@ -102,9 +103,8 @@ def _mark_lost(state, outcome):
 
 
 @inlined_kernel
-def judge(arena, state, nonlinear, outcome):
-    """Judge what happened in a step that has been flown."""
-    check_obstacles(arena, state, outcome)
+def judge_contacts(arena, state, nonlinear, outcome):
+    """Judge a step that has been flown, after `check_obstacles`."""
     check_separation(arena, state, outcome)
     check_fence_and_battery(arena, state, outcome)
     if rarely(arena.rules[0].judges_wrenches):
@@ -117,44 +117,71 @@ def judge(arena, state, nonlinear, outcome):
     state.step[0] += 1
 
 
-def advance_with(call_features: Any, fly: Any) -> Any:
-    """A step of the world, made of these functions.
+class WorldStages(NamedTuple):
+    """What `advance` does before and after it looks for contacts with obstacles, as there."""
+
+    prepare: Any
+    """`prepare(arena, state, commands, nonlinear, assistants, code, outcome)`: what is flown."""
+    move: Any
+    """`move(arena, state, nonlinear, code, outcome)`."""
+    judge: Any
+    """`judge(arena, state, nonlinear, code, outcome)`."""
+
+
+@cache
+def stages_with(call_features: Any, fly: Any) -> WorldStages:
+    """The stages of a step of the world, made of these functions.
 
     Args:
         call_features: See `points.call_features`.
         fly: See `flight.fly`.
     """
 
-    @kernel
-    def advance(arena, state, commands, nonlinear, assistants, code, outcome):
-        """Fly all UAS for one step and judge what happened by the rules of `docs/rules.md`.
-
-        Args:
-            arena: The arena.
-            state: The state; written in place.
-            commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
-            nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
-            assistants: What helps to fly, see `assistants`; None: nothing does. Commands of kind
-                GO_TO need guidance.
-            code: `FeatureCode` of what is in the arena; None: see `fly`.
-            outcome: (U,) of OUTCOME_DTYPE; written.
-        """
+    @inlined_kernel
+    def prepare(arena, state, commands, nonlinear, assistants, code, outcome):
         begin_step(state, commands, outcome)
         call_features(COMMAND, arena, state, code, outcome)
         if assistants is not None:
             measured = as_measured(state)
             for k in range(len(assistants)):
                 assist(assistants[k], arena, measured, nonlinear, outcome)
+
+    @inlined_kernel
+    def move(arena, state, nonlinear, code, outcome):
         fly(arena, state, nonlinear, code, outcome)
         call_features(MOVED, arena, state, code, outcome)
-        judge(arena, state, nonlinear, outcome)
+
+    @inlined_kernel
+    def judge(arena, state, nonlinear, code, outcome):
+        judge_contacts(arena, state, nonlinear, outcome)
         call_features(JUDGED, arena, state, code, outcome)
         call_features(SENSED, arena, state, code, outcome)
 
-    return advance
+    return WorldStages(prepare, move, judge)
 
 
-advance = advance_with(call_features, fly)
+STAGES = stages_with(call_features, fly)
+_prepare, _move, _judge = STAGES
+
+
+@kernel
+def advance(arena, state, commands, nonlinear, assistants, code, outcome):
+    """Fly all UAS for one step and judge what happened by the rules of `docs/rules.md`.
+
+    Args:
+        arena: The arena.
+        state: The state; written in place.
+        commands: (U,) of COMMAND_DTYPE, valid for every flying UAS (see `first_invalid`).
+        nonlinear: Fly the 6-DOF plant instead of the linear parameter-varying model.
+        assistants: What helps to fly, see `assistants`; None: nothing does. Commands of kind
+            GO_TO need guidance.
+        code: `FeatureCode` of what is in the arena; None: see `fly`.
+        outcome: (U,) of OUTCOME_DTYPE; written.
+    """
+    _prepare(arena, state, commands, nonlinear, assistants, code, outcome)
+    _move(arena, state, nonlinear, code, outcome)
+    check_obstacles(arena, state, outcome)
+    _judge(arena, state, nonlinear, code, outcome)
 
 
 @kernel

@@ -1,6 +1,6 @@
 """Many missions side by side in arrays: one compiled call flies all of them for one step."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -9,18 +9,11 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from uas_coverage_env.autopilot.assist import assistants
-from uas_coverage_env.compiled.kernels import machine_code
 from uas_coverage_env.entities.state import FLYING, STATE
 from uas_coverage_env.env.actions.given import accept_of_lanes
+from uas_coverage_env.env.batch.call import BatchCall
 from uas_coverage_env.env.batch.checkpoint import changing, checked
 from uas_coverage_env.env.batch.drawn import pool_of
-from uas_coverage_env.env.batch.kernel import (
-    BatchRules,
-    lane_code,
-    step_batch,
-    step_batch_in_threads,
-)
 from uas_coverage_env.env.batch.memory import (
     AUTORESET,
     DISABLED,
@@ -29,6 +22,7 @@ from uas_coverage_env.env.batch.memory import (
     REST,
     SAME_STEP,
     SubEnvironments,
+    lanes_at_once,
     new_missions,
 )
 from uas_coverage_env.env.batch.scenes import change_scenes, install_scenes
@@ -38,18 +32,16 @@ from uas_coverage_env.env.batch.state_dict import (
     fields_of,
     records_of,
 )
-from uas_coverage_env.env.episode.act import acting_of, is_own, refuse_what_it_wrote
+from uas_coverage_env.env.episode.act import refuse_what_it_wrote
 from uas_coverage_env.env.episode.express import Moment, joint_action_of
 from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Learners
 from uas_coverage_env.env.episode.observe import observing_of
-from uas_coverage_env.env.episode.pay import paying_of
 from uas_coverage_env.env.episode.settings import MissionKeywords, MissionSettings, takes_settings
-from uas_coverage_env.env.episode.step import ACCEPTED, Rules
+from uas_coverage_env.env.episode.step import ACCEPTED
 from uas_coverage_env.env.versions import V0, Version, version_named
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.scenario.source import ScenarioLike
-from uas_coverage_env.simulation.flight import feature_code
 from uas_coverage_env.simulation.world import swarm_state
 from uas_coverage_env.world import Command, SwarmState, WorldState
 from uas_coverage_env.world.arena import ARENA
@@ -103,6 +95,7 @@ class CoverageBatch:
         pool: The scenarios.
         missions: What happened, see `Missions`; the arrays are written by every step.
         autoreset: As in `batch_memory`.
+        call: Calls the compiled step.
 
     Raises:
         ValueError: An argument is none of what is allowed; says what is.
@@ -132,20 +125,20 @@ class CoverageBatch:
         self.chooses = self.settings.chooses
         self.filters = self.settings.safety_filter
         self.autoreset = AUTORESET[autoreset]
-        self.missions = new_missions(self.pool.sizes, self.num_envs, int(threads))
+        at_once = lanes_at_once(self.num_envs, self.n_uas, int(threads))
+        self.missions = new_missions(self.pool.sizes, self.num_envs, int(threads) * at_once)
         shape = (self.num_envs, self.n_uas, self.settings.observation_size)
         self._observations = (np.zeros(shape, np.float32), np.zeros(shape, np.float32))
-        self._threads = int(threads)
         self._observing = observing_of(self.settings.observation, self.settings.version.observation)
         # else kernels do, which neither draw nor change scenes
         self._begins_here = self.pool.draws or (self.pool.changes and self.autoreset == SAME_STEP)
         self._begun = False
-        self._kernel: Callable[..., int] | None = None
-        self._rules: BatchRules | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        # neither machine code nor its addresses travel
-        return {**self.__dict__, "_kernel": None, "_rules": None}
+        # `_draw_next` comes between the end of a mission and the next
+        begins_later = self._begins_here and self.autoreset == SAME_STEP
+        ends = DISABLED if begins_later else self.autoreset
+        self.call = BatchCall(
+            self.settings, self.pool, self.missions, self._observing, ends, int(threads)
+        )
 
     @property
     def worlds(self) -> WorldState:
@@ -276,7 +269,7 @@ class CoverageBatch:
             change_scenes(self.pool, self.missions, flew, self._observing, self.observation)
         if self._begins_here:
             self._draw_next(orders == DRAW)
-        if self._rules is not None and is_own(self._rules.rules.acting):
+        if self.call.is_own:
             names = [f"UAS {i}" for i in range(self.n_uas)]
             refuse_what_it_wrote(self.actions.kind, self.learners.asked, names)
         return self.observation
@@ -393,46 +386,13 @@ class CoverageBatch:
         lanes.terminated[:], lanes.truncated[:], lanes.rewards[:] = ends
 
     def _run(self, orders: NDArray[np.int64], *, in_place: bool = False) -> int:
-        rules = self._rules = self._rules or self._compiled_rules()
         before, free = self._observations
         if in_place:
             free = before
-        given = (self.pool.arrays, self.missions, orders, rules, before, free)
-        if self._kernel is None:
-            kernel = step_batch if self._threads == 1 else step_batch_in_threads
-            self._kernel = machine_code(kernel, given)
-        if self._threads == 1:
-            refused = self._kernel(*given)
-        else:
-            threads = numba.get_num_threads()
-            numba.set_num_threads(self._threads)
-            try:
-                refused = self._kernel(*given)
-            except SystemError as error:
-                # what a kernel raises in a parallel loop comes wrapped
-                raise error.__cause__ or error from None
-            finally:
-                numba.set_num_threads(threads)
+        refused = self.call(orders, before, free)
         if refused == ACCEPTED and not in_place:
             self._observations = free, before
         return refused
-
-    def _compiled_rules(self) -> BatchRules:
-        settings, kind = self.settings, self.actions.kind
-        goes_to = kind.goes_to or self.pool.goes_home
-        called = assistants(settings.return_mode, settings.safety_filter, goes_to=goes_to)
-        version = settings.version
-        paying = paying_of(settings.reward, settings.weights, version.reward)
-        nonlinear = settings.dynamics == "nonlinear"
-        code = feature_code(
-            self.pool.features, otherwise=nonlinear or self.pool.sizes["true vehicles"] > 0
-        )
-        acting = acting_of(kind, version.actions)
-        rules = Rules(acting, nonlinear, called, code, paying, self._observing)
-        # `_draw_next` comes between the end of a mission and the next
-        begins_later = self._begins_here and self.autoreset == SAME_STEP
-        autoreset = DISABLED if begins_later else self.autoreset
-        return BatchRules(rules, autoreset, lane_code(version, settings.observation_size))
 
 
 def _check_count(name: str, count: Any, most: int) -> None:

@@ -42,6 +42,20 @@ def swarm_column(column: int) -> int:
     return SWARM_ENERGY if column == ENERGY else column - FIRST_TERM + SWARM_FIRST_TERM
 
 
+UAS_AT_ONCE = 256
+"""So many UAS fly through a stage of the step before the next one begins: what they work on, and
+the machine code of a stage, stay in the processor's cache."""
+
+_SHARES = 4
+"""In so many blocks at least each thread flies its lanes, so that none waits long for another."""
+
+
+def lanes_at_once(num_envs: int, n_uas: int, threads: int) -> int:
+    """How many lanes fly through a stage before the next one begins."""
+    most = max(UAS_AT_ONCE // n_uas, 1)
+    return most if threads == 1 else min(most, -(-num_envs // (_SHARES * threads)))
+
+
 class MissionPool(NamedTuple):
     """All that missions of S scenarios need, for kernels."""
 
@@ -111,19 +125,19 @@ class Missions(NamedTuple):
     lanes: SubEnvironments
     final: Final
     scratch: Scratch
-    """With an axis of threads in front: all lanes that a thread flies share them, so they stay in
-    its cache."""
+    """With an axis of the lanes that fly at once in front: all blocks of lanes that a thread flies
+    share them, so they stay in its cache."""
     settled: NDArray[np.bool_]
     """(L, U) it does not fly, and what it saw last lies in both arrays of observations."""
 
 
-def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missions:
+def new_missions(sizes: Mapping[str, int], num_envs: int, at_once: int) -> Missions:
     """Missions of which none has begun, seeded with numbers of no meaning.
 
     Args:
         sizes: The largest of every named size, as `ScenarioPool.sizes`.
         num_envs: L.
-        threads: How many share the lanes.
+        at_once: How many fly at once, in all threads.
     """
     sizes = {**sizes, "L": num_envs, "Q": SWARM_FIRST_TERM + sizes["R"]}
     missions = Missions(
@@ -131,7 +145,7 @@ def new_missions(sizes: Mapping[str, int], num_envs: int, threads: int) -> Missi
         LEARNERS.zeros(sizes, lanes=num_envs),
         LANES.zeros(sizes),
         FINAL.zeros(sizes),
-        SCRATCH.zeros(sizes, lanes=threads),
+        SCRATCH.zeros(sizes, lanes=at_once),
         np.zeros((num_envs, sizes["U"]), dtype=np.bool_),
     )
     seeds = np.random.default_rng().integers(SEEDS, size=num_envs, dtype=np.uint64)

@@ -52,7 +52,7 @@ def scene_arrays(
     """
     slots = fitted_to(features, settings.features_in(known))
     arena = build_arena(known, measured_m=MEASURED_M, features=slots, judges_wrenches=True)
-    return arena, tables_of(known, before.ranges)
+    return arena, tables_of(arena, known, before.ranges)
 
 
 tables_at = pool_view(TABLES)
@@ -125,8 +125,8 @@ class ScenarioPool:
         actions = [actions_of(settings.kind, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
         tables = [
-            tables_of(scenario, each.ranges)
-            for scenario, each in zip(self.scenarios, actions, strict=True)
+            tables_of(ARENA.mission(worlds.arenas, s), scenario, each.ranges)
+            for s, (scenario, each) in enumerate(zip(self.scenarios, actions, strict=True))
         ]
         own_sizes = learners_sizes(settings, self.actions.size)
         observing = observing_of(settings.observation, settings.version.observation)

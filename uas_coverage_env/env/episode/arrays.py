@@ -20,6 +20,7 @@ from uas_coverage_env.env.episode.observe import observe_with
 from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.observation.nearest import neighbours_of, write_around
 from uas_coverage_env.env.observation.scales import scales_of
+from uas_coverage_env.env.observation.waypoints import fixed_of
 from uas_coverage_env.env.report import CONTACT_WITH, COVERED, FIRST_TERM, STATUS
 from uas_coverage_env.env.versions import Version
 from uas_coverage_env.scenario import Scenario
@@ -27,14 +28,16 @@ from uas_coverage_env.world import Arena, WorldState
 from uas_coverage_env.world.arena import ARENA
 
 
-def tables_of(scenario: Scenario, ranges: NDArray[np.float64]) -> Tables:
+def tables_of(arena: Arena, scenario: Scenario, ranges: NDArray[np.float64]) -> Tables:
     """What does not change as long as the scene does not.
 
     Args:
+        arena: The arena.
         scenario: As it is now.
         ranges: Of the actions.
     """
-    return Tables(ranges, scales_of(scenario), neighbours_of(scenario))
+    scales = scales_of(scenario)
+    return Tables(ranges, scales, neighbours_of(scenario), fixed_of(arena, scales))
 
 
 def learners_sizes(settings: MissionSettings, action_size: int) -> dict[str, int]:
@@ -70,8 +73,9 @@ def arrays_of(
     """
     sizes = ARENA.sizes_of(arena, learners_sizes(settings, actions.size))
     return EpisodeArrays(
-        sizes, tables_of(scenario, actions.ranges), LEARNERS.zeros(sizes), SCRATCH.zeros(sizes)
-    )
+        sizes, tables_of(arena, scenario, actions.ranges), LEARNERS.zeros(sizes),
+        SCRATCH.zeros(sizes),
+    )  # fmt: skip
 
 
 def first_observation(

@@ -13,6 +13,7 @@ from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.observation.nearest import N_AROUND, NEIGHBOURS_DTYPE, NO_TARGET
 from uas_coverage_env.env.observation.notes import NOTES_DTYPE
 from uas_coverage_env.env.observation.scales import K_WAYPOINTS, SCALES_DTYPE
+from uas_coverage_env.env.observation.waypoints import FIXED_DTYPE
 from uas_coverage_env.env.report import REPORT_SIZE
 from uas_coverage_env.env.rewards.potentials import N_POTENTIALS
 from uas_coverage_env.world.arena import ARENA
@@ -47,6 +48,7 @@ class Tables(NamedTuple):
     scales: Annotated[NDArray[np.void], SCALES_DTYPE, "U"]
     """What the numbers of an observation are divided by."""
     neighbours: Annotated[NDArray[np.void], NEIGHBOURS_DTYPE, "W"]
+    fixed: Annotated[NDArray[np.void], FIXED_DTYPE, "U", "W"]
 
 
 class Learners(NamedTuple):
@@ -84,6 +86,8 @@ class Scratch(NamedTuple):
     outcome: Annotated[NDArray[np.void], OUTCOME_DTYPE, "U"]
     values: Annotated[NDArray[np.float64], "U", "A"]
     """The numbers of an action in their units."""
+    looks: Annotated[NDArray[np.bool_], "U"]
+    """It observes in this step."""
 
 
 class Acting(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Any
 from numba import types
 
 from uas_coverage_env.compiled.calls import Signature
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
+from uas_coverage_env.compiled.kernels import in_turn, inlined_kernel, kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.entities.state import STATE
 from uas_coverage_env.env.episode.memory import LEARNERS, TABLES, Observing
@@ -65,21 +65,7 @@ def _with_notes(write: Any, needs: tuple[Any, ...]) -> Any:
 
 def noted(needs: Sequence[Any]) -> Any:
     """One kernel that calls others in turn."""
-    if not needs:
-
-        @inlined_kernel
-        def note_nothing(arena, state, tables, learners, i):
-            pass
-
-        return note_nothing
-    note, rest = needs[0], noted(needs[1:])
-
-    @inlined_kernel
-    def note_both(arena, state, tables, learners, i):
-        note(arena, state, tables, learners, i)
-        rest(arena, state, tables, learners, i)
-
-    return note_both
+    return in_turn(needs, "arena, state, tables, learners, i")
 
 
 def _written(blocks: Blocks, column: int, first: int) -> Any:
@@ -88,14 +74,17 @@ def _written(blocks: Blocks, column: int, first: int) -> Any:
     Nested, one function a block: of all of them written out in one, which compiles a second
     faster, LLVM makes a batch's step that takes a tenth longer.
     """
-    if not blocks:
+    write, size, n = blocks[0].write, blocks[0].size, len(blocks[0].parameters)
+    if len(blocks) == 1:
 
         @inlined_kernel
-        def write_nothing(arena, state, tables, learners, parameters, i, row):
-            pass
+        def write_last(arena, state, tables, learners, parameters, i, row):
+            write(
+                arena, state, tables, learners, i,
+                slice_view(parameters, first, n), slice_view(row, column, size),
+            )  # fmt: skip
 
-        return write_nothing
-    write, size, n = blocks[0].write, blocks[0].size, len(blocks[0].parameters)
+        return write_last
     rest = _written(blocks[1:], column + size, first + n)
 
     @inlined_kernel
@@ -109,62 +98,107 @@ def _written(blocks: Blocks, column: int, first: int) -> Any:
     return write_both
 
 
-@cache
-def observe_one_with(own: Blocks, *, calls: bool = True) -> Any:
-    """A kernel that observes, of which some blocks are part.
+LOOK = "arena, state, tables, learners, observing, looks, observation"
+"""The arguments of a look."""
 
-    Args:
-        own: These; each note that they need is taken once.
-        calls: Whether it can call others at their address, which a GPU cannot.
+_NUMBERS_OF_A_LOOK = 48
 
-    Returns:
-        `observe_one(arena, state, tables, learners, observing, i, row)`: writes the observation of
-        UAS i into its row (V,) of float32, and the waypoints that it chooses among.
+
+def blocks_of_looks(own: Blocks) -> list[Blocks]:
+    """Which blocks are written by each look after the first, see `looks_with`.
+
+    As many as follow one another and have no more numbers than `_NUMBERS_OF_A_LOOK`; one at least.
     """
-    note = noted(tuple(dict.fromkeys(note for block in own for note in block.needs)))
-    write = _written(own, 0, 0)
+    groups: list[Blocks] = []
+    for block in own:
+        n = sum(each.size for each in groups[-1]) if groups else _NUMBERS_OF_A_LOOK
+        if n + block.size > _NUMBERS_OF_A_LOOK:
+            groups.append(())
+        groups[-1] = (*groups[-1], block)
+    return groups
+
+
+@inlined_kernel
+def _choose(arena, state, tables, learners, observing, looks, observation):
+    for i in range(looks.shape[0]):
+        if looks[i]:
+            nearest_waypoints(arena, state, i, learners.candidates[i])
+
+
+def _look_of(needs: Sequence[Any], write: Any, calls: bool) -> Any:
+    """A look that writes blocks, after what has to be noted for them."""
+    note, notes = noted(needs), bool(needs)
 
     @inlined_kernel
-    def observe_own(arena, state, tables, learners, observing, i, row):
-        nearest_waypoints(arena, state, i, learners.candidates[i])
-        note(arena, state, tables, learners, i)
-        write(arena, state, tables, learners, observing.parameters, i, row)
+    def look(arena, state, tables, learners, observing, looks, observation):
+        if not calls or observing.begins_as_version[0]:
+            for i in range(looks.shape[0]):
+                if looks[i]:
+                    if notes:
+                        note(arena, state, tables, learners, i)
+                    write(
+                        arena, state, tables, learners, observing.parameters, i, observation[i]
+                    )  # fmt: skip
 
-    if not calls:
-        return observe_own
+    return look
 
-    @inlined_kernel
-    def observe_one(arena, state, tables, learners, observing, i, row):
-        nearest_waypoints(arena, state, i, learners.candidates[i])
-        if observing.begins_as_version[0]:
-            note(arena, state, tables, learners, i)
-            write(arena, state, tables, learners, observing.parameters, i, row)
-        if rarely(observing.calls.shape[0] > 0):
-            for b in range(observing.calls.shape[0]):
+
+@inlined_kernel
+def _call(arena, state, tables, learners, observing, looks, observation):
+    if rarely(observing.calls.shape[0] > 0):
+        for i in range(looks.shape[0]):
+            for b in range(observing.calls.shape[0] if looks[i] else 0):
                 call = observing.calls[b]
                 _write_block(
                     call.address, arena, state, tables, learners, i,
                     slice_view(observing.parameters, call.first, call.parameters),
-                    slice_view(row, call.column, call.width),
+                    slice_view(observation[i], call.column, call.width),
                 )  # fmt: skip
 
-    return observe_one
+
+@cache
+def looks_with(own: Blocks, *, calls: bool = True) -> tuple[Any, ...]:
+    """The kernels that observe, one after the other, of which some blocks are part.
+
+    Several, as a batch lets many missions look before the next one begins: the machine code of all
+    of them together fits into no cache.
+
+    Args:
+        own: These; each note that they need is taken once.
+        calls: Whether others can be called at their address, which a GPU cannot.
+
+    Returns:
+        Kernels of the arguments `LOOK`: for each UAS for which `looks` (U,) is set, a part of its
+        row of `observation` (U, V) float32 is written; the first one writes the waypoints that it
+        chooses among.
+    """
+    looks = [_choose]
+    column = first = 0
+    known: set[Any] = set()
+    for blocks in blocks_of_looks(own):
+        needs = dict.fromkeys(note for block in blocks for note in block.needs)
+        new = [note for note in needs if note not in known]
+        known |= needs.keys()
+        looks.append(_look_of(new, _written(blocks, column, first), calls))
+        column += sum(block.size for block in blocks)
+        first += sum(len(block.parameters) for block in blocks)
+    if calls:
+        looks[-1] = in_turn((looks[-1], _call), LOOK)
+    return tuple(looks)
 
 
 @cache
 def observe_with(own: Blocks) -> Any:
-    """A kernel that observes for many, of which some blocks are part.
+    """A kernel that observes, of which some blocks are part.
 
     Returns:
-        `observe(arena, state, tables, learners, observing, observes, observation)`: writes the
-        rows of `observation` (U, V) of those UAS for which `observes` (U,) is set.
+        `observe(arena, state, tables, learners, observing, looks, observation)`: writes the rows of
+        `observation` (U, V) of those UAS for which `looks` (U,) is set.
     """
-    observe_one = observe_one_with(own)
+    look = in_turn(looks_with(own), LOOK)
 
     @kernel
-    def observe(arena, state, tables, learners, observing, observes, observation):
-        for i in range(state.uas.shape[0]):
-            if observes[i]:
-                observe_one(arena, state, tables, learners, observing, i, observation[i])
+    def observe(arena, state, tables, learners, observing, looks, observation):
+        look(arena, state, tables, learners, observing, looks, observation)
 
     return observe

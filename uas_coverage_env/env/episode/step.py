@@ -3,12 +3,12 @@
 from functools import cache
 from typing import Any, NamedTuple
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel, rarely
+from uas_coverage_env.compiled.kernels import in_turn, inlined_kernel, kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.entities.state import FLYING, SWAPPING, as_observed
 from uas_coverage_env.env.episode.act import first_not_finite, write_commands_with
 from uas_coverage_env.env.episode.memory import EPISODE, Acting, Observing, Paying
-from uas_coverage_env.env.episode.observe import observe_one_with
+from uas_coverage_env.env.episode.observe import LOOK, looks_with
 from uas_coverage_env.env.episode.pay import compute_rewards_with
 from uas_coverage_env.env.observation.nearest import NO_TARGET, write_around
 from uas_coverage_env.env.report import (
@@ -24,7 +24,8 @@ from uas_coverage_env.env.report import (
     STATUS,
 )
 from uas_coverage_env.env.versions import Version
-from uas_coverage_env.simulation.step import advance
+from uas_coverage_env.simulation.step import STAGES, WorldStages
+from uas_coverage_env.world.contacts import check_obstacles
 
 ACCEPTED = -1
 
@@ -33,8 +34,8 @@ class Rules(NamedTuple):
     """What holds for all steps of a mission."""
 
     acting: Acting
-    nonlinear: bool
-    """Whether the 6-DOF plant is flown."""
+    nonlinear: int
+    """Whether the 6-DOF plant is flown, as a number."""
     assistants: Any
     """Which help to fly, see `autopilot.assist`; None on a GPU."""
     code: Any
@@ -43,18 +44,16 @@ class Rules(NamedTuple):
     observing: Observing
 
 
-def pay_step_with(compute_rewards: Any) -> Any:
-    """A kernel that rewards and reports a step.
+def _pay_with(compute_rewards: Any) -> Any:
+    """The stage that rewards and reports a step, and says who looks around.
 
     Args:
         compute_rewards: See `pay.compute_rewards_with`.
-
-    Returns:
-        `pay_step(arena, state, tables, learners, scratch, paying)`.
     """
 
     @inlined_kernel
-    def pay_step(arena, state, tables, learners, scratch, paying):
+    def pay(arena, state, tables, learners, scratch, rules):
+        paying = rules.paying
         report, amounts = learners.report, learners.amounts
         outcome = scratch.outcome
         compute_rewards(arena, state, tables, learners, scratch, paying)
@@ -78,84 +77,78 @@ def pay_step_with(compute_rewards: Any) -> Any:
         if newly_covered > 0:
             write_around(state.uncovered, tables.neighbours, learners.around)
         for i in range(report.shape[0]):
-            if rarely(not outcome[i].flew and state.uas[i].status == FLYING):
+            status, flew = state.uas[i].status, outcome[i].flew
+            if rarely(not flew and status == FLYING):
                 # where it was to go before it swapped packs is forgotten
                 learners.targets[i] = NO_TARGET
+            scratch.looks[i] = flew or status in (FLYING, SWAPPING)
 
-    return pay_step
+    return pay
 
 
-def look_around_with(observe_one: Any) -> Any:
-    """A kernel that observes a step, or a scene that is new to those that fly.
+STAGE = "arena, state, tables, learners, scratch, rules"
+"""The arguments of a stage of the flight."""
 
-    Args:
-        observe_one: See `observe.observe_one_with`.
 
-    Returns:
-        `look_around(arena, state, tables, learners, scratch, observing, new_scene, observation)`.
-        In a new scene only those that fly look around; what others have seen last stays.
+class Stages(NamedTuple):
+    """The stages of a step of a mission, in their order.
+
+    A single mission flies through all of them; a batch lets many fly through one before the next
+    begins, with the same results.
     """
 
-    @inlined_kernel
-    def look_around(arena, state, tables, learners, scratch, observing, new_scene, observation):
-        if rarely(new_scene):
-            write_around(state.uncovered, tables.neighbours, learners.around)
-        seen = as_observed(state)
-        for i in range(state.uas.shape[0]):
-            status = state.uas[i].status
-            if status == FLYING or (
-                not new_scene and (scratch.outcome[i].flew or status == SWAPPING)
-            ):
-                observe_one(arena, seen, tables, learners, observing, i, observation[i])
-
-    return look_around
+    flight: tuple[Any, ...]
+    """Fly and pay: kernels of the arguments `STAGE`. All actions are finite; at the end
+    `scratch.looks` says who looks around."""
+    looks: tuple[Any, ...]
+    """Observe, see `observe.looks_with`."""
 
 
 @cache
-def step_learners_of(
-    write_commands: Any, advance: Any, compute_rewards: Any, observe_one: Any
-) -> Any:
-    """The step of one mission, made of these functions.
+def stages_of(
+    write_commands: Any, world: WorldStages, compute_rewards: Any, looks: tuple[Any, ...]
+) -> Stages:
+    """The stages of a step, made of these functions.
 
     Args:
         write_commands: See `act.write_commands_with`.
-        advance: See `simulation.advance`.
+        world: See `simulation.step.stages_with`.
         compute_rewards: See `pay.compute_rewards_with`.
-        observe_one: See `observe.observe_one_with`.
-
-    Returns:
-        `step_learners(arena, state, tables, learners, scratch, rules, new_scene, observation)`:
-        flies one step and pays for it, unless the scene is another than before (`new_scene`); then
-        observes. All actions are finite; the row in `observation` (U, V) of a UAS that did not fly
-        stays.
+        looks: See `observe.looks_with`.
     """
-    pay_step = pay_step_with(compute_rewards)
-    look_around = look_around_with(observe_one)
+    prepare, move_world, judge_world = world
 
     @inlined_kernel
-    def step_learners(arena, state, tables, learners, scratch, rules, new_scene, observation):
-        if not rarely(new_scene):
-            seen = as_observed(state)
-            write_commands(arena, seen, tables, learners, scratch, rules.acting)
-            advance(
-                arena, state, scratch.commands, rules.nonlinear, rules.assistants, rules.code,
-                scratch.outcome,
-            )  # fmt: skip
-            pay_step(arena, state, tables, learners, scratch, rules.paying)
-        look_around(
-            arena, state, tables, learners, scratch, rules.observing, new_scene, observation
-        )
+    def act(arena, state, tables, learners, scratch, rules):
+        write_commands(arena, as_observed(state), tables, learners, scratch, rules.acting)
+        prepare(
+            arena, state, scratch.commands, rules.nonlinear != 0, rules.assistants, rules.code,
+            scratch.outcome,
+        )  # fmt: skip
 
-    return step_learners
+    @inlined_kernel
+    def move(arena, state, tables, learners, scratch, rules):
+        move_world(arena, state, rules.nonlinear != 0, rules.code, scratch.outcome)
+
+    @inlined_kernel
+    def meet(arena, state, tables, learners, scratch, rules):
+        check_obstacles(arena, state, scratch.outcome)
+
+    @inlined_kernel
+    def judge(arena, state, tables, learners, scratch, rules):
+        judge_world(arena, state, rules.nonlinear != 0, rules.code, scratch.outcome)
+
+    return Stages((act, move, meet, judge, _pay_with(compute_rewards)), looks)
 
 
-def step_learners_with(version: Version) -> Any:
-    """`step_learners_of` what is in a version; other blocks, terms and kinds are called."""
-    return step_learners_of(
+@cache
+def stages_with(version: Version) -> Stages:
+    """`stages_of` what is in a version; other blocks, terms and kinds are called."""
+    return stages_of(
         write_commands_with(version.actions),
-        advance,
+        STAGES,
         compute_rewards_with(version.reward),
-        observe_one_with(version.observation),
+        looks_with(version.observation),
     )
 
 
@@ -165,7 +158,7 @@ _N_NUMBERS = EPISODE.size
 
 @cache
 def step_episode_with(version: Version) -> Any:
-    """`step_learners` called from Python.
+    """A step of one mission called from Python; or in a scene that is new, the look around alone.
 
     Returns:
         `step_episode(at, nonlinear, new_scene, before, observation)`: ACCEPTED, or the index of a
@@ -174,7 +167,8 @@ def step_episode_with(version: Version) -> Any:
         arrays of `EPISODE` lie, then number and addresses of the assistants, then what features
         do: to hand over every array would take longer than the flight of a UAS.
     """
-    step_learners = step_learners_with(version)
+    stages = stages_with(version)
+    fly, look = in_turn(stages.flight, STAGE), in_turn(stages.looks, LOOK)
 
     @kernel
     def step_episode(at, nonlinear, new_scene, before, observation):
@@ -190,7 +184,15 @@ def step_episode_with(version: Version) -> Any:
         first = _N_NUMBERS + 1 + at[_N_NUMBERS]
         code = slice_view(at, first, at.shape[0] - first)
         rules = Rules(acting, nonlinear, assistants, code, paying, observing)
-        step_learners(arena, state, tables, learners, scratch, rules, new_scene, observation)
+        if rarely(new_scene):
+            # what those have seen last that do not fly stays
+            write_around(state.uncovered, tables.neighbours, learners.around)
+            for i in range(observation.shape[0]):
+                scratch.looks[i] = state.uas[i].status == FLYING
+        else:
+            fly(arena, state, tables, learners, scratch, rules)
+        seen = as_observed(state)
+        look(arena, seen, tables, learners, observing, scratch.looks, observation)
         return ACCEPTED
 
     return step_episode

@@ -12,20 +12,22 @@ import numpy as np
 from numba import cuda
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
+from uas_coverage_env.compiled.kernels import in_turn, inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory
-from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.env.batch.kernel import fly_lane_with, scratch_of
+from uas_coverage_env.compiled.views import rows_view
+from uas_coverage_env.entities.state import FLYING, as_observed
+from uas_coverage_env.env.batch.kernel import scratch_of
+from uas_coverage_env.env.batch.lane import finish_lane_with, keep_lane_with
 from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP
-from uas_coverage_env.env.batch.pool import learners_of
+from uas_coverage_env.env.batch.pool import learners_of, tables_at
 from uas_coverage_env.env.episode.act import begin_command, first_not_finite, refuse_unflyable
-from uas_coverage_env.env.episode.observe import observe_one_with
+from uas_coverage_env.env.episode.observe import LOOK, looks_with
 from uas_coverage_env.env.episode.pay import compute_rewards_with
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.env.episode.step import ACCEPTED, Rules, step_learners_of
+from uas_coverage_env.env.episode.step import ACCEPTED, STAGE, Rules, Stages, stages_of
 from uas_coverage_env.features.feature import MissionFeature
-from uas_coverage_env.simulation.on_gpu import advance_of, begin_features_of
-from uas_coverage_env.simulation.pool import state_of
+from uas_coverage_env.simulation.on_gpu import begin_features_of, stages_on_gpu
+from uas_coverage_env.simulation.pool import arena_of, state_of
 
 
 class Marks(NamedTuple):
@@ -73,6 +75,31 @@ def _write_commands_with(write: Any, own: bool) -> Any:
 
 
 @cache
+def _fly_lane_with(stages: Stages, begin_features: Any, width: int) -> Any:
+    """What one lane does in a step; a thread has no others to fly with it."""
+    fly, look = in_turn(stages.flight, STAGE), in_turn(stages.looks, LOOK)
+    keep_lane = keep_lane_with(width, fetches=False)
+    finish_lane = finish_lane_with(begin_features, width)
+
+    @inlined_kernel
+    def fly_lane(pool, missions, rules, lane, order, observation):
+        if order == FLY:
+            keep_lane(pool, missions, lane, observation, observation)
+            s = missions.lanes.scene[lane]
+            arena, tables = arena_of(pool.arenas, s), tables_at(pool.tables, s)
+            state = state_of(missions.worlds, lane, pool.arenas, s)
+            learners = learners_of(missions.learners, lane, pool.arenas, s)
+            scratch = scratch_of(missions.scratch, lane, pool.arenas, s)
+            fly(arena, state, tables, learners, scratch, rules)
+            rows = rows_view(observation, lane, (arena.uas.shape[0], width))
+            seen = as_observed(state)
+            look(arena, seen, tables, learners, rules.observing, scratch.looks, rows)
+        finish_lane(pool, missions, rules, lane, order, NEXT_STEP, observation, observation)
+
+    return fly_lane
+
+
+@cache
 def _is_refused_with(choices: int) -> Any:
     """Whether one of the actions (U, size) of a lane is none."""
 
@@ -106,19 +133,19 @@ def step_with(
     nonlinear, width = settings.dynamics == "nonlinear", settings.observation_size
     write = settings.kind.write
     own = all(write is not kind.write for kind in settings.version.actions)
-    step_learners = step_learners_of(
+    stages = stages_of(
         _write_commands_with(write, own),
-        advance_of(features, nonlinear or otherwise),
+        stages_on_gpu(features, nonlinear or otherwise),
         compute_rewards_with(settings.reward, calls=False),
-        observe_one_with(settings.observation, calls=False),
+        looks_with(settings.observation, calls=False),
     )
-    fly_lane = fly_lane_with(step_learners, begin_features_of(features), fetches=False)
+    fly_lane = _fly_lane_with(stages, begin_features_of(features), width)
     is_refused = _is_refused_with(settings.kind.choices)
-    return _launched(fly_lane, is_refused, nonlinear, width, changes)
+    return _launched(fly_lane, is_refused, nonlinear, changes)
 
 
 @cache  # to compile it again takes minutes
-def _launched(fly_lane: Any, is_refused: Any, nonlinear: bool, width: int, changes: bool) -> Any:
+def _launched(fly_lane: Any, is_refused: Any, nonlinear: bool, changes: bool) -> Any:
     @kernel
     def step_lane(pool, missions, marks, acting, paying, observing, observation, lane):
         lanes = missions.lanes
@@ -130,9 +157,7 @@ def _launched(fly_lane: Any, is_refused: Any, nonlinear: bool, width: int, chang
         if marks.refused[lane]:
             return
         rules = Rules(acting, nonlinear, None, None, paying, observing)
-        fly_lane(
-            pool, missions, rules, lane, order, lane, NEXT_STEP, observation, observation, width
-        )
+        fly_lane(pool, missions, rules, lane, order, observation)
         marks.ended[lane] = lanes.terminated[lane] or lanes.truncated[lane]
         if order == FLY:
             # as a kind of action does that wrote what cannot be flown

@@ -122,7 +122,7 @@ class CudaMissions:
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
-        here = new_missions(pool.sizes, num_envs, threads=num_envs)
+        here = new_missions(pool.sizes, num_envs, at_once=num_envs)
         # there is no end of a mission to keep: the next one begins in another step
         here = here._replace(final=here.final._make(array[:0] for array in here.final))
         shape = (num_envs, n_uas, told.observation_size)

@@ -77,6 +77,70 @@ def _open_within(north_m, east_m, down_m, uncovered, x, y, z, limit_m2):
 
 
 @inlined_kernel
+def _exchange(index, away_m2, first):
+    """Put pairs of neighbours into order, from one place on; no branches: all at once."""
+    for c in range(first, K_WAYPOINTS - 1, 2):
+        near_m2, far_m2 = away_m2[c], away_m2[c + 1]
+        one, other = index[c], index[c + 1]
+        turned = near_m2 > far_m2
+        away_m2[c] = far_m2 if turned else near_m2
+        away_m2[c + 1] = near_m2 if turned else far_m2
+        index[c] = other if turned else one
+        index[c + 1] = one if turned else other
+
+
+@inlined_kernel
+def _still_open(arena, state, i, x, y, z, candidates, away_m2):
+    """Put those into order that were the nearest before, without those that are none any more.
+
+    Returns:
+        How many there are; behind them are infinite distances.
+    """
+    columns = arena.waypoint_columns
+    uncovered = state.uncovered
+    n_waypoints = uncovered.shape[0]
+    asks = arena.rules[0].asks
+    index = stack_array(K_WAYPOINTS)
+    order_m2 = stack_array(K_WAYPOINTS)
+    found = 0
+    for c in range(K_WAYPOINTS):
+        known = 0 <= candidates[c] < n_waypoints
+        w = candidates[c] if known else 0
+        known = known and uncovered[w] and (not asks or can_cover(arena, i, w))
+        m2 = _away_m2(columns, w, x, y, z)
+        order_m2[c] = m2 if known else math.inf
+        index[c] = w
+        found += known
+    # from one step to the next hardly any change places with more than one or two others
+    for _ in range(2):
+        _exchange(index, order_m2, 0)
+        _exchange(index, order_m2, 1)
+    ordered = True
+    for c in range(K_WAYPOINTS - 1):
+        ordered &= order_m2[c] < order_m2[c + 1]
+    # arrays of their own: those above stay in registers
+    for c in range(K_WAYPOINTS):
+        candidates[c] = int(index[c])
+        away_m2[c] = order_m2[c]
+    if not ordered:
+        for c in range(K_WAYPOINTS):
+            insert(candidates, away_m2, c, candidates[c], away_m2[c])
+    return found
+
+
+@inlined_kernel
+def _n_open_within(north_m, east_m, down_m, uncovered, x, y, z, limit_m2):
+    """How many open waypoints are no farther than a limit."""
+    n = 0
+    for w in range(uncovered.shape[0]):
+        dx = north_m[w] - x
+        dy = east_m[w] - y
+        dz = down_m[w] - z
+        n += uncovered[w] & (dx * dx + dy * dy + dz * dz <= limit_m2)
+    return n
+
+
+@inlined_kernel
 def nearest_waypoints(arena, state, i, candidates):
     """The open waypoints nearest to UAS i; of two equally near, the first of the scenario.
 
@@ -98,20 +162,20 @@ def nearest_waypoints(arena, state, i, candidates):
     n_waypoints = uncovered.shape[0]
     asks = arena.rules[0].asks
     away_m2 = stack_array(K_WAYPOINTS)
-    found = 0
-    for c in range(K_WAYPOINTS):
-        w = candidates[c]
-        if 0 <= w < n_waypoints and uncovered[w] and (not asks or can_cover(arena, i, w)):
-            m2 = _away_m2(columns, w, x, y, z)
-            found = insert(candidates, away_m2, found, w, m2)
+    found = _still_open(arena, state, i, x, y, z, candidates, away_m2)
+    n_within = _n_open_within(
+        slice_view(columns[NORTH_M], 0, n_waypoints), slice_view(columns[EAST_M], 0, n_waypoints),
+        slice_view(columns[DOWN_M], 0, n_waypoints), uncovered, x, y, z, away_m2[K_WAYPOINTS - 1],
+    )  # fmt: skip
+    if n_within == K_WAYPOINTS and found == K_WAYPOINTS:
+        return  # mostly: they are still the nearest
     for first in range(0, n_waypoints, _WORD):
         n = min(_WORD, n_waypoints - first)
-        limit_m2 = away_m2[K_WAYPOINTS - 1] if found == K_WAYPOINTS else math.inf
         bits = _open_within(
             slice_view(columns[NORTH_M], first, n),
             slice_view(columns[EAST_M], first, n),
             slice_view(columns[DOWN_M], first, n),
-            slice_view(uncovered, first, n), x, y, z, limit_m2,
+            slice_view(uncovered, first, n), x, y, z, away_m2[K_WAYPOINTS - 1],
         )  # fmt: skip
         held = 0
         for c in range(found):

@@ -25,9 +25,15 @@ def close(distance_m):
 
 
 @inlined_kernel
+def level_m(dx, dy):
+    """Length of a horizontal vector [m]."""
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@inlined_kernel
 def direction(dx, dy, row, k):
     """Write the horizontal unit vector towards a place; returns the next column."""
-    distance_m = math.sqrt(dx * dx + dy * dy)
+    distance_m = level_m(dx, dy)
     per_m = 1.0 / distance_m if distance_m > STRAIGHT_M else 0.0
     row[k] = within(dx * per_m, -1.0, 1.0)
     row[k + 1] = within(dy * per_m, -1.0, 1.0)

@@ -11,6 +11,9 @@ from uas_coverage_env.scenario import Scenario
 K_WAYPOINTS = 12
 """Open waypoints in an observation, nearest first; the waypoint action chooses among them."""
 
+AT_ONCE = 16
+"""So many of them the processor takes at once; those beyond K_WAYPOINTS are left out."""
+
 K_UAS = 3
 """Other UAS in an observation, nearest first."""
 
