@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from toy_problems import box, moving, state, toy
+from uas_coverage_baselines.milp_mpc.fallback import evasion as evasive_flights
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
@@ -142,6 +143,22 @@ def test_between_samples_nothing_passes_unseen(share):
     assert plan is not None
     away = plan.x[0, 2:4, :3] - HERE
     assert np.hypot(away[:, 0], away[:, 2]).min() > 2.0
+
+
+def test_rounding_chooses_none_of_the_directions_that_are_as_good(monkeypatch):
+    # all ways out at right angles to a thin obstacle's path are as short, but for the last digits
+    problem = coming(FROM_THE_WEST, radius_m=1.0)
+    flights, ends = evasive_flights._flights, set()
+    for seed in range(4):
+        noise = np.random.default_rng(seed)
+
+        def rounded(*args, noise=noise):
+            x, u = flights(*args)
+            return x * (1.0 + 1e-14 * noise.standard_normal(x.shape)), u
+
+        monkeypatch.setattr(evasive_flights, "_flights", rounded)
+        ends.add(tuple(evasion(problem, 1.0).x[0, -1, :3].round(3)))
+    assert len(ends) == 1
 
 
 def test_where_no_flight_is_clear_the_one_that_comes_least_too_near_is_flown():

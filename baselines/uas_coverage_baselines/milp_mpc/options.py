@@ -115,7 +115,7 @@ class MovingHorizonOptions(OcpOptions):
         default=1.0,
         gt=0.0,
         le=1000.0,
-        description="work per decision, the same on every machine; 1 takes less than 1 s of a core",
+        description="work per decision, the same on every machine; 1 takes about 1 s of a core",
     )
     time_limit_s: TimeLimitS = Field(
         default=None,

@@ -52,7 +52,8 @@ def evasion(problem: PlanningProblem, dt_s: float) -> Plan | None:
                 apart = _dense(x[..., :3] - flights[other][0][chosen[other], :, :3])
                 cost += _squared(problem.separation_m[uas, other] - outside_upright_m(apart))
         moved_m = np.linalg.norm(x[:, -1, :3] - x[0, -1, :3], axis=1)
-        chosen[uas] = int(np.lexsort((moved_m, cost.round(6)))[0])
+        # of directions that are as good the first, whatever the last digits say
+        chosen[uas] = int(np.lexsort((moved_m.round(6), cost.round(6)))[0])
     if not any(chosen):
         return None
     rows = [flights[uas][0][chosen[uas]] for uas in range(problem.n_uas)]

@@ -42,7 +42,7 @@ class Effort:
     """How much work a decision may take, counted in what every machine repeats.
 
     Attributes:
-        work: of the programs (`work_of`); with 1 it takes a quiet core less than a second.
+        work: of the programs (`work_of`); with 1 it takes a quiet core about a second.
         threads: how many restricted programs are solved side by side; changes no result.
         teams: how many constructed teams are refined.
         at_once: how many UAS are planned for, at most; the others go on with what they have.
