@@ -129,16 +129,17 @@ def a_place(arena, rng):
 @given(seed=st.integers(0, 9999))
 def test_a_crossing_and_the_shortest_way_are_those_of_asking_every_side_and_corner(scene, seed):
     arena, rng = scene[0].arena, np.random.default_rng(seed)
-    here = a_place(arena, rng)
+    x0, y0 = a_place(arena, rng)
     w = int(rng.integers(len(arena.waypoints)))
-    there = arena.waypoints[w].position_m[:2] if rng.random() < 0.7 else a_place(arena, rng)
+    x1, y1 = arena.waypoints[w].position_m[:2] if rng.random() < 0.7 else a_place(arena, rng)
     if rng.random() < 0.3:  # along a side
-        there = np.array([here[0], there[1]])
+        x1 = x0
     for obstacle in arena.obstacles:
-        found = crossing(obstacle, arena.normals, arena.offsets_m, *here, *there)
-        assert found == asked_crossing(arena, obstacle, *here, *there)
+        found = crossing(obstacle, arena.normals, arena.offsets_m, x0, y0, x1, y1)
+        assert found == asked_crossing(arena, obstacle, x0, y0, x1, y1)
     z0 = -rng.uniform(1.0, 39.5)
-    assert way(arena, w, *here, z0, *there, -10.0) == asked_way(arena, w, *here, z0, *there, -10.0)
+    found = way(arena, w, x0, y0, z0, x1, y1, -10.0)
+    assert found == asked_way(arena, w, x0, y0, z0, x1, y1, -10.0)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
