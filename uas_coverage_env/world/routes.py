@@ -72,7 +72,7 @@ def _entry(normals, offsets_m, inflation_m, x0, y0, x1, y1):
         offset = offsets_m[h] - inflation_m
         d0 = normals[h, 0] * x0 + normals[h, 1] * y0 + offset
         d1 = normals[h, 0] * x1 + normals[h, 1] * y1 + offset
-        at = d0 / (d0 - d1)
+        at = d0 / (d0 - d1 if d0 != d1 else 1.0)
         misses |= (d0 >= 0.0) & (d1 >= 0.0)
         enters = max(enters, at if (d0 >= 0.0) & (d1 < 0.0) else 0.0)
         leaves = min(leaves, at if (d0 < 0.0) & (d1 >= 0.0) else 1.0)
@@ -121,18 +121,12 @@ def hides(obstacle, normals, offsets_m, x0, y0, x1, y1):
 
 
 @kernel
-def first_between(obstacles, normals, offsets_m, x0, y0, x1, y1):
-    """The first tall obstacle that hides one place from another; -1 where none does."""
+def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
+    """Whether no tall obstacle hides one place from another."""
     for o in range(obstacles.shape[0]):
         if obstacles[o].tall and hides(obstacles[o], normals, offsets_m, x0, y0, x1, y1):
-            return o
-    return -1
-
-
-@kernel
-def in_sight(obstacles, normals, offsets_m, x0, y0, x1, y1):
-    """Whether no tall obstacle lies between two places."""
-    return first_between(obstacles, normals, offsets_m, x0, y0, x1, y1) < 0
+            return False
+    return True
 
 
 @kernel
@@ -208,7 +202,7 @@ def _sees_corner(arena, corner, x0, y0, sight):
 
 
 @kernel
-def _next_corner(arena, target, x0, y0, sight):
+def next_corner(arena, target, x0, y0, sight):
     """The corner in sight over which the way to a target is the shortest; -1 where there is none.
 
     The shortest way is tried first, then the next: mostly the first or second corner is in sight.
@@ -275,7 +269,7 @@ def route(arena, target, x0, y0, z0, x1, y1, z1):
         return x1, y1, straight_m, IN_SIGHT
     sight = stack_array(SIGHT)
     forget_corners(sight)
-    corner = _next_corner(arena, target, x0, y0, sight)
+    corner = next_corner(arena, target, x0, y0, sight)
     if corner < 0:
         return x1, y1, straight_m, NO_WAY
     north_m, east_m, way_m = way_round(arena, corner, target, x0, y0)
@@ -308,45 +302,16 @@ def leg_from_corner(arena, target, x0, y0, z0, x1, y1, z1):
 
 
 @inlined_kernel
-def corner_past(arena, between, target, x0, y0, z0, x1, y1, z1, sight):
-    """The corner round which the way to a target leads that a tall obstacle hides.
-
-    Args:
-        arena: The mission.
-        between: The obstacle, see `first_between`.
-        target: See `route`, likewise the places.
-        x0: See `route`.
-        y0: See `route`.
-        z0: See `route`.
-        x1: See `route`.
-        y1: See `route`.
-        z1: See `route`.
-        sight: (any,) what is known of corners from there, see `forget_corners`; written.
-
-    Returns:
-        Its index; -1 where the straight line in space is free, or there is no way round.
-    """
-    obstacle, normals, offsets_m = arena.obstacles[between], arena.normals, arena.offsets_m
-    # mostly it is in the way of the straight line in space, too
-    obstructed = not box_apart(obstacle, x0, y0, z0, x1, y1, z1) and obstructs(
-        obstacle, normals, offsets_m, x0, y0, z0, x1, y1, z1
-    )
-    if not obstructed and line_is_clear(arena, x0, y0, z0, x1, y1, z1):
-        return -1
-    return _next_corner(arena, target, x0, y0, sight)
-
-
-@inlined_kernel
 def shortest_way(arena, target, x0, y0, z0, x1, y1, z1):
     """The first three of `route`, for callers that do not need the next leg.
 
     The tall obstacles are asked first: they are few, and mostly none is in the way.
     """
-    between = first_between(arena.obstacles, arena.normals, arena.offsets_m, x0, y0, x1, y1)
-    if between >= 0:
+    in_view = in_sight(arena.obstacles, arena.normals, arena.offsets_m, x0, y0, x1, y1)
+    if not in_view and not line_is_clear(arena, x0, y0, z0, x1, y1, z1):
         sight = stack_array(SIGHT)
         forget_corners(sight)
-        corner = corner_past(arena, between, target, x0, y0, z0, x1, y1, z1, sight)
+        corner = next_corner(arena, target, x0, y0, sight)
         if corner >= 0:
             return way_round(arena, corner, target, x0, y0)
     dx = x1 - x0
@@ -355,8 +320,8 @@ def shortest_way(arena, target, x0, y0, z0, x1, y1, z1):
 
 
 @inlined_kernel
-def write_between(obstacles, normals, offsets_m, x0, y0, x1, y1, n, between):
-    """`first_between` one place and each of several.
+def hidden_ones(obstacles, normals, offsets_m, x0, y0, x1, y1, n):
+    """Which of several places are not `in_sight` of one, as the bits of a number.
 
     Most obstacles lie aside of most of them: one place and the other beyond the same side, which
     is asked for all others at once.
@@ -367,14 +332,12 @@ def write_between(obstacles, normals, offsets_m, x0, y0, x1, y1, n, between):
         offsets_m: (F,) [m].
         x0: North of the one place [m].
         y0: East of it [m].
-        x1: (K,) north of the others [m]; K is at most 63, and a constant.
+        x1: (K,) north of the others [m], at most 62.
         y1: (K,) east of them [m].
         n: How many there are; what lies behind in `x1` and `y1` are numbers, too.
-        between: (K,) written.
     """
-    for c in range(x1.shape[0]):
-        between[c] = -1.0
-    left = (1 << n) - 1
+    all_ones = (1 << n) - 1
+    hidden = 0
     for o in range(obstacles.shape[0]):
         if not obstacles[o].tall:
             continue
@@ -385,10 +348,10 @@ def write_between(obstacles, normals, offsets_m, x0, y0, x1, y1, n, between):
                 for c in range(x1.shape[0]):
                     beyond = north * x1[c] + east * y1[c] + offset_m >= 0.0
                     apart |= np.int64(beyond) << c
-        bits = left & ~apart
+        bits = all_ones & ~(apart | hidden)
         while bits != 0:
             c = lowest_bit(bits)
             bits &= bits - 1
             if hides(obstacles[o], normals, offsets_m, x0, y0, x1[c], y1[c]):
-                between[c] = o
-                left &= ~(1 << c)
+                hidden |= 1 << c
+    return hidden

@@ -106,7 +106,9 @@ class BatchCall:
         if self._given is None:
             given = Given.of(pool, self._missions, self._rules())
             self._given = given, GIVEN.numbers_of(given)
-        elif any(now is not kept for now, kept in zip(pool, self._given[0].pool, strict=True)):
+        elif pool is not self._given[0].pool and any(
+            now is not kept for now, kept in zip(pool, self._given[0].pool, strict=True)
+        ):
             given = Given.of(pool, self._missions, self._given[0].flight.rules)
             self._given = given, GIVEN.numbers_of(given)
         return self._given[1]

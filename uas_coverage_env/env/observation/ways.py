@@ -1,6 +1,11 @@
 """The ways past obstacles to the open waypoints nearest to a UAS."""
 
-from uas_coverage_env.compiled.kernels import inlined_kernel, stack_array, stack_array_f32
+from uas_coverage_env.compiled.kernels import (
+    inlined_kernel,
+    lowest_bit,
+    stack_array,
+    stack_array_f32,
+)
 from uas_coverage_env.compiled.transposed import transposing
 from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.env.observation.block import Feature, Group, ObservationBlock, flag
@@ -9,10 +14,11 @@ from uas_coverage_env.env.observation.scales import AT_ONCE, K_WAYPOINTS
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.routes import (
     SIGHT,
-    corner_past,
     forget_corners,
+    hidden_ones,
+    line_is_clear,
+    next_corner,
     way_round,
-    write_between,
 )
 
 _FEATURES = (
@@ -40,7 +46,6 @@ def write(arena, state, tables, learners, i, parameters, row):
     leg_x = stack_array(AT_ONCE)
     leg_y = stack_array(AT_ONCE)
     way_m = stack_array(AT_ONCE)
-    between = stack_array(AT_ONCE)
     features = stack_array_f32(_N_NUMBERS)
     north = slice_view(features, AT_ONCE * _AT.direction, AT_ONCE)
     east = slice_view(features, AT_ONCE * (_AT.direction + 1), AT_ONCE)
@@ -58,16 +63,16 @@ def write(arena, state, tables, learners, i, parameters, row):
         leg_x[c] = leg_y[c] = 0.0
     for c in range(AT_ONCE):
         way_m[c] = level_m(leg_x[c] - x, leg_y[c] - y)
-    write_between(arena.obstacles, arena.normals, arena.offsets_m, x, y, leg_x, leg_y, n, between)
+    hidden = hidden_ones(arena.obstacles, arena.normals, arena.offsets_m, x, y, leg_x, leg_y, n)
     sight = stack_array(SIGHT)
     forget_corners(sight)
-    for c in range(n):
-        if between[c] >= 0.0:
-            w, position_m = candidates[c], arena.waypoints[candidates[c]].position_m
-            corner = corner_past(
-                arena, int(between[c]), w, x, y, z, position_m[0], position_m[1], position_m[2],
-                sight,
-            )  # fmt: skip
+    while hidden != 0:
+        c = lowest_bit(hidden)
+        hidden &= hidden - 1
+        w = candidates[c]
+        down_m = arena.waypoints[w].position_m[2]
+        if not line_is_clear(arena, x, y, z, leg_x[c], leg_y[c], down_m):
+            corner = next_corner(arena, w, x, y, sight)
             if corner >= 0:
                 leg_x[c], leg_y[c], way_m[c] = way_round(arena, corner, w, x, y)
     for c in range(AT_ONCE):
