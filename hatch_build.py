@@ -9,6 +9,7 @@ compiled when they are first used, as from a wheel without them.
 
 import json
 import os
+import platform
 import runpy
 import subprocess
 import sys
@@ -29,6 +30,8 @@ class Kernels(BuildHookInterface):
         """Compile what the first commands and environments of a user need."""
         if version == "editable":  # such an installation has a cache beside its sources
             return
+        if platform.machine() not in ("x86_64", "AMD64"):
+            self.app.abort(f"kernels are compiled for x86-64, not for {platform.machine()}")
         root = Path(self.root)
         self._folder = tempfile.TemporaryDirectory()
         folder = Path(self._folder.name)

@@ -39,6 +39,9 @@ LEARNERS: dict[str, tuple[Any, str, dict[str, Any]]] = {
         {"decisions": FlownMaskableRolloutBuffer, "every row": MaskableRolloutBuffer},
     ),
 }
+N_MISSIONS = 100
+"""To learn from, of the training split."""
+
 HEAD = (
     "learner", "seed", "learned from", "rows without a decision, %", "flown steps", "covered, %",
     "home", "score",
@@ -78,7 +81,7 @@ def trained(name: str, which: str, seed: int, given: argparse.Namespace) -> tupl
     """A row of the table."""
     learner, action, buffers = LEARNERS[name]
     task = level_named(given.level)
-    missions = list(task.scenarios("training", 100).values())
+    missions = list(task.scenarios("training", N_MISSIONS).values())
     env = CoverageVecEnv(16, missions, **task.settings(action=action))
     buffer = buffers[which]
     model = learner(

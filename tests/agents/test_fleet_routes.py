@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from uas_coverage_agents.policy import load_policy
+from uas_coverage_agents.route import fleet_routes
 from uas_coverage_agents.route.fleet_routes import CHANGES, FleetRoutes, RouteProblems
 from uas_coverage_agents.route.layers import layers_of
 from uas_coverage_agents.route.order import (
     IN_THE_AIR,
     WEIGHT,
+    build,
     home_seconds,
     leg_seconds,
     observe_choices,
@@ -15,7 +17,7 @@ from uas_coverage_agents.route.order import (
 )
 from uas_coverage_agents.route.planner import SHIPPED
 
-from uas_coverage_env import generate_scenario
+from uas_coverage_env import generate_scenario, load_planner
 from uas_coverage_env.mission import MissionBrief, first_sight
 from uas_coverage_env.planning.routing import SearchEffort, improve_routes
 from uas_coverage_env.planning.routing.legs import Legs
@@ -96,3 +98,22 @@ def test_changes_make_routes_cheaper_and_each_waypoint_is_still_visited_once(n_u
     before, after = built(brief, 0), built(brief, CHANGES)
     assert sorted(np.concatenate(after)) == list(range(24))
     assert cost_s(brief, after) < cost_s(brief, before)
+
+
+@pytest.mark.parametrize("name", ["learned-velocity", "learned-route"])
+def test_a_warm_up_builds_one_set_of_routes_and_the_mission_after_it_all_of_them(name, monkeypatch):
+    built = []
+
+    def counted(*arguments):
+        built.append(name)
+        return build(*arguments)
+
+    monkeypatch.setattr(fleet_routes, "build", counted)
+    brief, planner = town(2, 6), load_planner(name)
+    planner.reset(brief, 0)
+    for_a_mission = len(built)
+    planner.warm_up(brief)
+    for_a_warm_up = len(built) - for_a_mission
+    assert 0 < for_a_warm_up <= 3
+    planner.reset(brief, 0)
+    assert len(built) - for_a_mission - for_a_warm_up == for_a_mission > 10

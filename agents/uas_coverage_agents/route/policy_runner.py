@@ -68,11 +68,12 @@ class RouteRunner:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile all that decides."""
-        rehearsed, self._rehearsed = self._rehearsed, min(self._rehearsed, 1)
+        asked = self._samples, self._rehearsed
+        self._samples, self._rehearsed = 1, min(self._rehearsed, 1)
         self.reset(brief, 0)
         self._rehearsal = None
         self.act(first_sight(brief))
-        self._rehearsed = rehearsed
+        self._samples, self._rehearsed = asked
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Build the first routes; samples and changes draw from the seed."""

@@ -71,8 +71,10 @@ class RouteVelocityRunner:
 
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile all that decides."""
+        samples, self._samples = self._samples, 1
         self.reset(brief, 0)
         self.act(first_sight(brief))
+        self._samples = samples
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Build the first routes; samples draw from the seed."""
