@@ -19,6 +19,10 @@ class Infos:
         settings: How it is flown.
         learners: The arrays of the mission.
         scratch: Likewise.
+
+    Attributes:
+        of: `of(i, row, amounts)`, the info of UAS i: made of its row of the report and its row of
+            the amounts, the columns of `env.report`.
     """
 
     def __init__(self, settings: MissionSettings, learners: Learners, scratch: Scratch) -> None:
@@ -29,18 +33,10 @@ class Infos:
         self._learners = learners
         self._scratch = scratch
         self._told = _written_out(settings.version.infos, settings.term_names)
-        if not (self._masks or self._filters or self._flat):
-            # one call less, in what is called most often
-            self.of = self._told
+        more = self._masks or self._filters or self._flat
+        self.of = self._with_more if more else self._told
 
-    def of(self, i: int, row: Sequence[int], amounts: Sequence[float]) -> dict[str, Any]:
-        """The info of a UAS.
-
-        Args:
-            i: Its index.
-            row: Its row of the report, the columns of `env.report`.
-            amounts: Its row of the amounts, likewise.
-        """
+    def _with_more(self, i: int, row: Sequence[int], amounts: Sequence[float]) -> dict[str, Any]:
         info = self._told(i, row, amounts)
         if self._masks:
             info["action_mask"] = self.action_mask(i)
