@@ -163,8 +163,6 @@ class Episode:
         report_start(self._world.state, self._learners)
         self.observation = np.zeros(self._observation_shape, np.float32)
         self._look()
-        for array in as_bytes(self._scratch):
-            array[:] = 0
         self._first = [array.copy() for array in self._restarted], self.observation
         return self._first
 
