@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
 from uas_coverage_env.compiled.kernels import kernel
-from uas_coverage_env.compiled.memory import Memory, Values
+from uas_coverage_env.compiled.memory import Memory, Values, as_bytes
 from uas_coverage_env.compiled.views import (
     Layout,
     copy_arrays,
@@ -105,6 +105,14 @@ def double_rows(array, row, n):
     rows = rows_view(array, row, (n, 4))
     for k in range(n):
         rows[k, 3] *= 2.0
+
+
+def test_bytes_copied_from_one_mission_make_another_the_same():
+    given, written = depot(3, 0, seed=1), depot(3, 0, seed=2)
+    for source, target in zip(as_bytes(given), as_bytes(written), strict=True):
+        target[:] = source
+    for ours, expected in zip(written, depot(3, 0, seed=1), strict=True):
+        np.testing.assert_array_equal(ours, expected)
 
 
 def test_new_arrays_have_the_declared_types_and_shapes():

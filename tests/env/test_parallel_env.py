@@ -152,6 +152,14 @@ def test_types_are_plain():
     assert type(info["contact"]) is type(info["contact_with"]) is type(info["status"]) is int
 
 
+def test_every_mission_begins_with_the_infos_of_the_first():
+    env = uas_coverage_v0.parallel_env(practice_ground(), safety_filter=True)
+    _, first = env.reset()
+    env.step({agent: np.array([1.0, 0.5, 0.0]) for agent in env.agents})
+    _, again = env.reset()
+    assert str(again) == str(first)
+
+
 def test_return_mode_brings_all_home_whatever_is_asked():
     env = uas_coverage_v0.parallel_env(practice_ground(), return_mode=True)
     env.reset()

@@ -268,6 +268,18 @@ def test_attributes_are_asked_of_every_mission():
         env.get_attr("nothing")
 
 
+def test_infos_stay_as_they_were_told():
+    env = make(scenario="village")
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    told = []
+    for _ in range(60):
+        *_, infos = env.step(env.action_space.sample())
+        told.append((infos, str(infos)))
+    for infos, then in told:
+        assert str(infos) == then
+
+
 def test_a_copy_in_another_process_flies_on():
     env = CoverageVectorEnv(2, GROUND)
     env.reset()

@@ -14,7 +14,7 @@ arrays themselves (`Memory.zeros`), those of many missions side by side (`lanes`
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import (
     Annotated,
@@ -279,6 +279,14 @@ class Memory(Generic[T]):
     def numba_type(self) -> Any:
         """The declaration as a type of numba's."""
         return typeof(self.zeros(dict.fromkeys(self.names, 0)))
+
+
+def as_bytes(arrays: Iterable[NDArray[Any]]) -> list[NDArray[np.uint8]]:
+    """Views of those contiguous arrays that hold anything, to be copied to and fro.
+
+    Numpy copies records field by field, ten times as long, even where there are none.
+    """
+    return [array.view(np.uint8) for array in arrays if array.size]
 
 
 def _end_to_end(blocks: Sequence[NDArray[Any]]) -> tuple[NDArray[Any], list[int]]:

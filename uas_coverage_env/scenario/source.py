@@ -136,7 +136,7 @@ class MissionSource:
         Raises:
             ValueError: The generator returned no scenario, or one that does not fit.
         """
-        return self.fitted(self._drawn(rng))
+        return self.example if self.fixed else self.fitted(self._drawn(rng))
 
     def fitted(self, scenario: str | Path | Scenario | Mapping[str, Any]) -> Scenario:
         """A scenario as this environment flies it: agents have their names.

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.assist import AssistantCode, assistants
 from uas_coverage_env.compiled.kernels import machine_code
+from uas_coverage_env.compiled.memory import as_bytes
 from uas_coverage_env.compiled.random import SEEDS
 from uas_coverage_env.entities.codes import DynamicsName
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, KIND_NAMES, Command, pack
@@ -187,6 +188,8 @@ class World:
         self.reset(seed)
 
     def _prepare(self) -> None:
+        # in a scene that has changed sizes are others: `reset` prepares anew
+        self._restarted = list(zip(as_bytes(self._state), as_bytes(self._start), strict=False))
         self._outcomes = np.zeros((0, len(self.names)), dtype=OUTCOME_DTYPE)
         self._next_outcome = 0
         self._step: StepCode | None = None
@@ -195,7 +198,7 @@ class World:
 
     def __getstate__(self) -> dict[str, Any]:
         # neither machine code nor addresses travel: they are made anew wherever the copy goes
-        stays = ("_step", "_assistants", "_outcomes", "_at")
+        stays = ("_step", "_assistants", "_outcomes", "_at", "_restarted")
         return {k: v for k, v in self.__dict__.items() if k not in stays}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -226,7 +229,7 @@ class World:
             self.known, self.arena, self.revisions = self.scenario, self._first_arena, 0
             self._state = self._start.copy()
             self._prepare()
-        for array, start in zip(self.state, self._start, strict=True):
+        for array, start in self._restarted:
             array[:] = start
         if self.features or len(self.state.events):
             begin_features_at(self._addresses(), np.uint64(self._seed), mission)

@@ -28,6 +28,8 @@ Observations = dict[str, Any]
 """Of each agent that acted: an array, or a dictionary with `mask_in_observation`."""
 Infos = dict[str, dict[str, Any]]
 
+_IN_FLIGHT = FLYING, SWAPPING
+
 
 class CoverageParallelEnv(Versioned, ParallelEnv[str, NDArray[np.float32], Any]):
     """Several UAS cover the waypoints of an area and come home before their batteries end.
@@ -272,7 +274,7 @@ class CoverageParallelEnv(Versioned, ParallelEnv[str, NDArray[np.float32], Any])
         for agent in agents:
             i = index[agent]
             row, paid = report[i], amounts[i]
-            flies = row[STATUS] in (FLYING, SWAPPING)
+            flies = row[STATUS] in _IN_FLIGHT
             observations[agent] = observation[i]
             rewards[agent] = paid[REWARD]
             terminations[agent] = not flies

@@ -354,7 +354,7 @@ class CoverageVectorEnv(Versioned, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
         if not mask.all():
             report, swarm = report * mask[:, None, None], swarm * mask[:, None]
         else:
-            swarm = swarm.copy()
+            report, swarm = report.copy(), swarm.copy()
         terms: dict[str, Any] = {}
         for column, name in enumerate(self._batch.settings.term_names, SWARM_FIRST_TERM):
             terms[name] = swarm[:, column]
@@ -365,12 +365,12 @@ class CoverageVectorEnv(Versioned, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
                 infos[field.name] = swarm[:, swarm_column(field.column)]
             elif field.of_swarm:
                 told = report[:, 0, field.column]
-                infos[field.name] = told > 0 if field.flag else told.copy()
+                infos[field.name] = told > 0 if field.flag else told
         infos["scenario"] = self._batch.lanes.scenario * mask
         for field in self.version.infos:
             if not (field.of_amounts or field.of_swarm):
                 column = report[:, :, field.column]
-                told = column > 0 if field.flag else column.copy()
+                told = column > 0 if field.flag else column
                 infos[field.name] = np.where(absent, field.absent, told) if field.absent else told
         if self._batch.filters:
             infos["filtered"] = report[:, :, FILTERED] > 0

@@ -7,13 +7,14 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.assist import assistants
 from uas_coverage_env.compiled.kernels import machine_code
+from uas_coverage_env.compiled.memory import as_bytes
 from uas_coverage_env.env.actions.given import actions_of
 from uas_coverage_env.env.episode.act import acting_of, is_own, refuse_what_it_wrote
 from uas_coverage_env.env.episode.arrays import arrays_of, report_start
 from uas_coverage_env.env.episode.express import Moment
 from uas_coverage_env.env.episode.global_state import global_state
 from uas_coverage_env.env.episode.infos import Infos
-from uas_coverage_env.env.episode.memory import EPISODE, Learners
+from uas_coverage_env.env.episode.memory import EPISODE
 from uas_coverage_env.env.episode.observe import observe_with, observing_of
 from uas_coverage_env.env.episode.pay import paying_of
 from uas_coverage_env.env.episode.settings import MissionSettings
@@ -78,7 +79,7 @@ class Episode:
         self.observation = np.zeros(self._observation_shape, np.float32)
         self.steps = 0
         self.amounts: list[list[float]] = []
-        self._first: tuple[Learners, NDArray[np.float32]] | None = None
+        self._first: tuple[list[NDArray[np.uint8]], NDArray[np.float32]] | None = None
         self._prepare()
 
     def _lay_out(self) -> None:
@@ -124,15 +125,14 @@ class Episode:
         at = np.array([*addresses, len(called), *called, *code])
         self._given = (at, nonlinear)
         seen = self.observation
-        # to assign a record field by field takes ten times as long
-        self._scratch_bytes = [array.view(np.uint8) for array in self._scratch]
+        self._restarted = as_bytes((*self._learners, *self._scratch))
         self._step = machine_code(step_episode_with(version), (*self._given, False, seen, seen))
 
     def __getstate__(self) -> dict[str, Any]:
         # neither machine code nor addresses and views travel
         stays = (
             "asked", "asked_rows", "infos", "_report", "_paid", "_step", "_given",
-            "_scratch_bytes", "_acting", "_paying", "_observing",
+            "_restarted", "_acting", "_paying", "_observing",
         )  # fmt: skip
         return {key: value for key, value in self.__dict__.items() if key not in stays}
 
@@ -153,22 +153,17 @@ class Episode:
             self._prepare()
         self.steps = 0
         first, observation = self._first or self._look_first()
-        for array, start in zip(self._learners, first, strict=True):
+        for array, start in zip(self._restarted, first, strict=True):
             array[:] = start
-        for array in self._scratch_bytes:
-            array[:] = 0
         self.observation = observation.copy()
         self.amounts = self._learners.amounts.tolist()
 
-    def _look_first(self) -> tuple[Learners, NDArray[np.float32]]:
+    def _look_first(self) -> tuple[list[NDArray[np.uint8]], NDArray[np.float32]]:
         """What missions begin with, always the same; kept."""
         report_start(self._world.state, self._learners)
         self.observation = np.zeros(self._observation_shape, np.float32)
         self._look()
-        self._first = (
-            self._learners._make(array.copy() for array in self._learners),
-            self.observation,
-        )
+        self._first = [array.copy() for array in self._restarted], self.observation
         return self._first
 
     def _look(self) -> None:

@@ -19,29 +19,25 @@ class Infos:
         settings: How it is flown.
         learners: The arrays of the mission.
         scratch: Likewise.
+
+    Attributes:
+        of: `of(i, row, amounts)`, the info of UAS i: made of its row of the report and its row of
+            the amounts, the columns of `env.report`.
     """
 
     def __init__(self, settings: MissionSettings, learners: Learners, scratch: Scratch) -> None:
-        self._told = _written_out(settings.version.infos, settings.term_names)
         self._kind = settings.kind
         self._masks = settings.chooses and not settings.mask_in_observation
         self._filters = settings.safety_filter
         self._flat = settings.flat_infos
-        self._tells_more = self._masks or self._filters or self._flat
         self._learners = learners
         self._scratch = scratch
+        self._told = _written_out(settings.version.infos, settings.term_names)
+        more = self._masks or self._filters or self._flat
+        self.of = self._with_more if more else self._told
 
-    def of(self, i: int, row: Sequence[int], amounts: Sequence[float]) -> dict[str, Any]:
-        """The info of a UAS.
-
-        Args:
-            i: Its index.
-            row: Its row of the report, the columns of `env.report`.
-            amounts: Its row of the amounts, likewise.
-        """
-        info = self._told(row, amounts)
-        if not self._tells_more:
-            return info
+    def _with_more(self, i: int, row: Sequence[int], amounts: Sequence[float]) -> dict[str, Any]:
+        info = self._told(i, row, amounts)
         if self._masks:
             info["action_mask"] = self.action_mask(i)
         if self._filters:
@@ -60,7 +56,7 @@ class Infos:
 @cache
 def _written_out(
     fields: tuple[InfoField, ...], terms: tuple[str, ...]
-) -> Callable[[Sequence[int], Sequence[float]], dict[str, Any]]:
+) -> Callable[[int, Sequence[int], Sequence[float]], dict[str, Any]]:
     """A function that makes an info from the rows of a UAS.
 
     Its source is written out, a dictionary literal: a third of the time of `dict(zip(...))`, and
@@ -73,7 +69,7 @@ def _written_out(
     paid = (f"{name!r}: amounts[{k}]" for k, name in enumerate(terms, FIRST_TERM))
     told.append(f"'reward_terms': {{{', '.join(paid)}}}")
     # names as Python quotes them, columns as numbers: there is nothing else in it
-    made: Callable[..., dict[str, Any]] = eval(f"lambda row, amounts: {{{', '.join(told)}}}")
+    made: Callable[..., dict[str, Any]] = eval(f"lambda i, row, amounts: {{{', '.join(told)}}}")
     return made
 
 

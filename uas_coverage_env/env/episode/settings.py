@@ -178,7 +178,7 @@ class MissionSettings:
         """(R,) the weights of the terms."""
         return weights_of(self.reward, self.reward_weights)
 
-    @property
+    @functools.cached_property
     def term_names(self) -> tuple[str, ...]:
         """(R,) the names of the terms."""
         return tuple(term.name for term in self.reward)
