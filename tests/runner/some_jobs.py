@@ -6,6 +6,8 @@ import sys
 import time
 from pathlib import Path
 
+LONG_S = 60.0
+
 
 def twice(number: int) -> int:
     """A quick one."""
@@ -80,4 +82,4 @@ def many(folder: str) -> None:
 def long(folder: str, number: int) -> None:
     """Notes its process, and takes long."""
     (Path(folder) / f"{number}-{os.getpid()}").touch()
-    time.sleep(60.0)
+    time.sleep(LONG_S)

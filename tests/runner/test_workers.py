@@ -1,5 +1,6 @@
 """The runner with real processes: nothing lost, nothing twice, whatever is killed."""
 
+import _thread
 import os
 import signal
 import subprocess
@@ -130,6 +131,15 @@ def test_what_is_under_way_ends_where_nobody_wants_the_rest(pair, tmp_path):
 def test_ctrl_c_is_for_the_owner_alone_from_the_start_of_a_process_on(pair):
     assert run(pair, Job("a", some_jobs.held)) == {"a": True}
     assert not some_jobs.held()
+
+
+def test_ctrl_c_just_before_it_waits_ends_the_wait_before_the_jobs_do(pair, tmp_path):
+    # this says that a signal has come, and interrupts no call of the system
+    threading.Timer(0.5, _thread.interrupt_main).start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        run(pair, Job("long", some_jobs.long, (str(tmp_path), 0)))
+    assert time.monotonic() - began < some_jobs.LONG_S
 
 
 @pytest.mark.skipif(os.name != "posix", reason="POSIX")

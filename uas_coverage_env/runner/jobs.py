@@ -46,7 +46,7 @@ class Crew(Protocol):
         ...
 
     def finished(self) -> list[tuple[Job, bytes | Lost]]:
-        """Wait until there is news; what `done` gave, or what was lost."""
+        """Wait for news, or a moment; what `done` gave, or what was lost."""
         ...
 
     def abandon(self) -> None:

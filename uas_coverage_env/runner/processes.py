@@ -13,6 +13,9 @@ from multiprocessing.process import BaseProcess
 
 from uas_coverage_env.runner.jobs import Job, Lost, done
 
+_AT_LEAST_S = 1.0
+"""Ctrl-C just before a wait begins does not end it: so none lasts longer [s]."""
+
 
 @dataclass(frozen=True)
 class _Worker:
@@ -56,7 +59,7 @@ class Processes:
     def finished(self) -> list[tuple[Job, bytes | Lost]]:
         """See `Crew`."""
         found: list[tuple[Job, bytes | Lost]] = []
-        for pipe in wait(list(self._busy)):
+        for pipe in wait(list(self._busy), _AT_LEAST_S):
             assert isinstance(pipe, Connection)
             worker, job = self._busy[pipe]
             try:
