@@ -6,7 +6,9 @@ import pytest
 from toy_problems import planned
 from uas_coverage_baselines.milp_mpc.model.problem_file import read_problems
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
+from uas_coverage_baselines.milp_mpc.search import decision
 from uas_coverage_baselines.milp_mpc.search.decision import Effort, decide
+from uas_coverage_baselines.milp_mpc.search.team_search import TeamSearch
 
 FLOWN = read_problems(Path(__file__).parents[2] / "benchmarks" / "village_decisions.json")
 THOROUGH = Effort(work=4.0, threads=1)  # enough for the joint program of each
@@ -22,3 +24,17 @@ def test_a_decision_of_the_village_is_as_good_as_it_was(step):
     assert first_trouble(problem, plan) is None
     assert plan.objective <= OBJECTIVES[step] + max(0.02 * abs(OBJECTIVES[step]), 0.1)
     assert plan.relative_gap() is not None, "the joint program says how far the best may be"
+
+
+def test_decisions_of_one_uas_end_within_their_work(monkeypatch):
+    searches = []
+
+    class Kept(TeamSearch):
+        def __init__(self, *args):
+            super().__init__(*args)
+            searches.append(self)
+
+    monkeypatch.setattr(decision, "TeamSearch", Kept)
+    for step in (60, 95):
+        assert planned(decide(FLOWN[step].only(0), None, 1.0, Effort(threads=1))).covers.any()
+    assert all(0.3 < search.work < 1.0 for search in searches), "30 nodes take twice as much"

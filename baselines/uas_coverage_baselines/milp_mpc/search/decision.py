@@ -5,8 +5,8 @@ solved first, restricted to the neighbourhood of a trajectory: what is left of i
 and the constructed trajectories that make the best teams (programs of some hundredths of a second,
 solved side by side). A UAS without a plan then gets wider programs, and after these a plan that
 needs no solver (`fallback.plans`). The best team of the plans found is checked as a whole; then the
-whole OCP starts from it with the work that is left, a share of which is kept for it, for the bound
-and what it still finds.
+root of the whole OCP starts from it with the work that is left, a share of which is kept for it,
+for the bound. One UAS by itself whose plan covers nothing gets another program first.
 
 Work is counted in what every machine repeats (nodes, simplex iterations, sizes of programs), and in
 an order that does not depend on threads, so that a decision is the same on every machine. A time
@@ -97,6 +97,7 @@ def decide(
     if search.programs:
         round_robin.work_of_one = search.work / search.programs
     search.combine(spare)
+    search.cover()
     search.improve()
     return search.outcome
 

@@ -55,8 +55,8 @@ NARROW = Neighbourhood(earlier_steps=3, later_steps=1, face_slack_m=1.0)
 ALONG = Neighbourhood(
     earlier_steps=100, later_steps=100, face_slack_m=3.0, other_faces=True, other_waypoints=True
 )
-"""With an order given little is left to choose but when to visit: only the sides at which shapes
-are passed stay near the flight's."""
+"""Only the sides at which shapes are passed stay near the flight's: quick where an order is given,
+which leaves little to choose but when to visit, and where a flight is a good one."""
 WIDE = Neighbourhood(earlier_steps=100, later_steps=100, face_slack_m=30.0, other_faces=True)
 """Finds the way around what the flight runs into."""
 

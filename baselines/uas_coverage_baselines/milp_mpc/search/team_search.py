@@ -17,6 +17,7 @@ from uas_coverage_baselines.milp_mpc.model.ocp import OCP, Block
 from uas_coverage_baselines.milp_mpc.model.problem import NEVER, Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
 from uas_coverage_baselines.milp_mpc.search.restricted import (
+    ALONG,
     TIGHTEST,
     Neighbourhood,
     RestrictedMilp,
@@ -64,7 +65,7 @@ class Effort:
 _LATE = 0.15  # share of the time limit kept for verification and whatever is late
 _WORTH_STARTING_S = 0.05  # less time than this gives no plan
 _TEAMS_VERIFIED = 6
-_NODES, _ALONE_NODES = 60, 30
+_NODES = 60
 _JOINT_NODES = 1  # the root: its bound and what comes of the start
 _JOINT_SHARE = 0.6  # of the work: the most that is kept for the joint program
 _AT_LEAST, _AT_MOST = 1.1, 2.0  # of the work: with which it is solved, with which all ends
@@ -260,24 +261,32 @@ class TeamSearch:
         )
         return replace(joined, objective=joined.objective + coupling, renewed=renewed)
 
+    def cover(self) -> None:
+        """One UAS by itself whose best plan covers nothing: near it, open to all waypoints."""
+        best, problem = self._best, self.problem
+        if best is None or problem.n_uas > 1 or problem.n_waypoints == 0 or best.covers.any():
+            return
+        if self.work < self.effort.work:
+            self._collect(0, self._refined(0, as_trajectory(problem, 0, best), ALONG))
+            for plan in self._plans[0]:
+                self._offer(self._joined([plan]))
+
     def improve(self) -> None:
         """The whole OCP from the best plan so far, with the work that is left.
 
         In the tightest form, since its bound is what is asked for, and the only one that a plan
-        gets; of several UAS the root.
+        gets; its root alone: what comes after takes seconds, and no limit of work ends it.
         """
         if not self._joint or self.work + self._joint > _AT_LEAST * self.effort.work:
             return
-        alone = self.problem.n_uas == 1
-        if alone and self.problem.tours:
+        if self.problem.n_uas == 1 and self.problem.tours:
             program = self._own[0]
         else:
             program = RestrictedMilp(self.problem, self._blocks, first=self.effort.joint)
         start = None
         if self._best is not None:
             start = program.start(self._best.x[:, :, 0:3], visits(self.problem, self._best))
-        nodes = self._nodes(_ALONE_NODES if alone else _JOINT_NODES)
-        limits = SolverLimits(nodes=nodes, relative_gap=0.01, heuristics=False)
+        limits = SolverLimits(nodes=self._nodes(_JOINT_NODES), relative_gap=0.01, heuristics=False)
         solution = self._solved(program, limits, start)
         if solution is not None:
             self.work += _JOINT_DEARER * work_of(program, solution.iterations)
