@@ -4,7 +4,7 @@ import itertools
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 from uas_coverage_env.files.strict_toml import InputError
@@ -35,7 +35,7 @@ class PlannerSpec:
     options: Mapping[str, Any]
     fingerprint: str
     package: str
-    own_sha256: str = ""
+    own_sha256: str = field(default="", kw_only=True)
 
     @classmethod
     def named(cls, label: str, planner: str, options: Mapping[str, str] | None = None) -> Self:
