@@ -72,7 +72,7 @@ or a step, whichever is longer: a velocity held for a step moves that end on by 
 _WIND_TO_HURRY = 0.5
 """Of the highest airspeed: in a stronger wind a gust may take all of it, and braking takes longer
 than simulated. There, as in still air, a UAS comes home slowly [-]. Without it, 2 of 151 UAS were
-blown over the fence (docs/wind_method.md)."""
+blown over the fence (docs/wind_and_models.md)."""
 
 _AS_WISHED, _LEVEL, _IN_PLACE, _STRAIGHT_ON = range(4)
 
