@@ -1,6 +1,7 @@
 """What is published: each table of the pages has a command, and one command makes all of them."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,8 +13,9 @@ from uas_coverage_env.files.errors import InputError
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 import publish
-from marks import filled, places
+from marks import filled, pages, places
 
+BENCHMARK = re.compile(r"python benchmarks/([a-z_]+\.py)")
 TABLE = "| planner | energy |\n|---|---:|\n"
 
 
@@ -31,6 +33,13 @@ def test_commands_say_where_their_results_go_and_run_here():
                 assert (publish.ROOT / command.split()[1]).exists(), name
         if figures.fill:
             assert "{out}" in figures.command, name
+
+
+def test_each_benchmark_that_a_page_names_is_run():
+    """But for those that fill pages or prepare a figure, and those that only a user runs."""
+    named = {name for page in pages() for name in BENCHMARK.findall(page.read_text("utf-8"))}
+    run_by = BENCHMARK.findall(publish.FIGURES.read_text("utf-8"))
+    assert named - set(run_by) <= {"publish.py", "put_table.py"}
 
 
 @pytest.fixture
