@@ -54,21 +54,18 @@ def missions(request, monkeypatch):
     return missions_on_gpu.CudaMissions(2, ground, **OWN[request.param])
 
 
-def arguments(missions):
-    """The types of what the step of all lanes is handed."""
-    given = missions._pool_there, missions.missions, missions._marks, *missions._parts
-    return tuple(map(typeof, (*given, missions._rows)))
-
-
 def test_numba_finds_the_types_of_all_that_the_step_calls(missions):
     # on the simulated GPU it runs as Python, which asks for none
-    step_lane = getclosurevars(missions._launched.py_func).nonlocals["step_lane"]
-    step_lane.compile((*arguments(missions), types.int64))
+    for launch in missions._launches:
+        part = getclosurevars(launch.kernel.py_func).nonlocals["part"]
+        part.compile((typeof(missions._numbers), types.int64))
 
 
 def test_the_step_compiles_for_a_gpu(compiler, missions):
     from numba.cuda import compile_ptx
 
-    code, _ = compile_ptx(missions._launched.py_func, arguments(missions), cc=COMPUTE_CAPABILITY)
-    assert ".visible .entry" in code
-    assert ".extern .func" not in code  # all that is called is there
+    for launch in missions._launches:
+        arguments = (typeof(missions._numbers),)
+        code, _ = compile_ptx(launch.kernel.py_func, arguments, cc=COMPUTE_CAPABILITY)
+        assert ".visible .entry" in code
+        assert ".extern .func" not in code  # all that is called is there

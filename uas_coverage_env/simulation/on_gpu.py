@@ -7,7 +7,7 @@ from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.compiled.random import counted
 from uas_coverage_env.features.feature import MissionFeature, Point
 from uas_coverage_env.simulation.flight import fly, fly_otherwise_with
-from uas_coverage_env.simulation.step import WorldStages, stages_with
+from uas_coverage_env.simulation.step import WorldStages, plain_stages_with, stages_with
 
 
 @cache
@@ -26,6 +26,8 @@ def stages_on_gpu(features: tuple[MissionFeature, ...], otherwise: bool) -> Worl
     )
     call_features = _in_turn(kernels)
     otherwise = otherwise or any(feature.disturbs for feature in features)
+    if not otherwise and all(point >= Point.JUDGED for point, _, _ in kernels):
+        return plain_stages_with(call_features)
     return stages_with(call_features, fly_otherwise_with(call_features) if otherwise else fly)
 
 

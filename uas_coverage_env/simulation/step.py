@@ -10,7 +10,7 @@ from uas_coverage_env.compiled.views import Layout, slice_view
 from uas_coverage_env.entities.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.entities.outcome import NONE
 from uas_coverage_env.entities.state import FLYING, LOST, STATE, as_measured
-from uas_coverage_env.simulation.flight import fly
+from uas_coverage_env.simulation.flight import fly, fly_still_of
 from uas_coverage_env.simulation.points import (
     COMMAND,
     JUDGED,
@@ -57,42 +57,48 @@ def first_invalid(arena, state, commands):
 
 
 @inlined_kernel
-def begin_step(state, commands, outcome):
-    """An outcome in which nothing has happened yet, with the commands as they were given.
+def begin_step_of(state, commands, outcome, i):
+    """An outcome of a UAS in which nothing has happened yet, with its command as it was given.
 
     Field by field, which is an eighth of a step faster than a record at once; a test finds a field
     that is forgotten here. What acts on how UAS fly is reset by `flight.clear`.
     """
+    event = outcome[i]
+    event.flew = state.uas[i].status == FLYING
+    for k in range(3):
+        event.before_m[k] = state.x[i, X + k]
+    for k in range(N_INPUTS):
+        event.u[k] = 0.0
+    event.voltage_V = 0.0
+    event.current_A = 0.0
+    event.energy_Wh = 0.0
+    event.newly_covered = 0
+    event.newly_covered_weight = 0.0
+    event.contact = NONE
+    event.contact_with = -1
+    event.breaches = 0
+    event.too_low = False
+    event.limits_exceeded = 0
+    event.landed = False
+    event.obstacle_clearance_m = math.inf
+    event.separation_m = math.inf
+    event.fence_clearance_m = math.inf
+    event.filtered = False
+    event.grounded = False
+    given = commands[i]
+    event.returning = given.returning
+    applied = event.applied_command
+    applied.kind = given.kind
+    for k in range(4):
+        applied.values[k] = given.values[k]
+    applied.returning = given.returning
+
+
+@inlined_kernel
+def begin_step(state, commands, outcome):
+    """`begin_step_of` all UAS."""
     for i in range(commands.shape[0]):
-        event = outcome[i]
-        event.flew = state.uas[i].status == FLYING
-        for k in range(3):
-            event.before_m[k] = state.x[i, X + k]
-        for k in range(N_INPUTS):
-            event.u[k] = 0.0
-        event.voltage_V = 0.0
-        event.current_A = 0.0
-        event.energy_Wh = 0.0
-        event.newly_covered = 0
-        event.newly_covered_weight = 0.0
-        event.contact = NONE
-        event.contact_with = -1
-        event.breaches = 0
-        event.too_low = False
-        event.limits_exceeded = 0
-        event.landed = False
-        event.obstacle_clearance_m = math.inf
-        event.separation_m = math.inf
-        event.fence_clearance_m = math.inf
-        event.filtered = False
-        event.grounded = False
-        given = commands[i]
-        event.returning = given.returning
-        applied = event.applied_command
-        applied.kind = given.kind
-        for k in range(4):
-            applied.values[k] = given.values[k]
-        applied.returning = given.returning
+        begin_step_of(state, commands, outcome, i)
 
 
 @inlined_kernel
@@ -117,8 +123,21 @@ def judge_contacts(arena, state, nonlinear, outcome):
     state.step[0] += 1
 
 
+class OfUas(NamedTuple):
+    """A stage of a step for one UAS, whatever the others do in it.
+
+    The processor flies all through it in turn, a GPU has a thread for each.
+    """
+
+    kernel: Any
+    """Takes what the stage of all takes, and then the index of the UAS."""
+
+
 class WorldStages(NamedTuple):
-    """What `advance` does before and after it looks for contacts with obstacles, as there."""
+    """What `advance` does before and after it looks for contacts with obstacles, as there.
+
+    The first two may be `OfUas`.
+    """
 
     prepare: Any
     """`prepare(arena, state, commands, nonlinear, assistants, code, outcome)`: what is flown."""
@@ -126,6 +145,16 @@ class WorldStages(NamedTuple):
     """`move(arena, state, nonlinear, code, outcome)`."""
     judge: Any
     """`judge(arena, state, nonlinear, code, outcome)`."""
+
+
+@inlined_kernel
+def _prepare_still(arena, state, commands, nonlinear, assistants, code, outcome, i):
+    begin_step_of(state, commands, outcome, i)
+
+
+@inlined_kernel
+def _move_still(arena, state, nonlinear, code, outcome, i):
+    fly_still_of(arena, state, i, outcome)
 
 
 @cache
@@ -158,6 +187,12 @@ def stages_with(call_features: Any, fly: Any) -> WorldStages:
         call_features(SENSED, arena, state, code, outcome)
 
     return WorldStages(prepare, move, judge)
+
+
+def plain_stages_with(call_features: Any) -> WorldStages:
+    """`stages_with`, where nothing acts on how UAS fly: in still air, by the linear model."""
+    judge = stages_with(call_features, fly).judge
+    return WorldStages(OfUas(_prepare_still), OfUas(_move_still), judge)
 
 
 STAGES = stages_with(call_features, fly)

@@ -38,8 +38,8 @@ from uas_coverage_env.env.gpu.device import (
     write,
     write_lane,
 )
-from uas_coverage_env.env.gpu.kernel import MARKS, Marks, step_with, take_actions
-from uas_coverage_env.env.gpu.refused import Given, refuse
+from uas_coverage_env.env.gpu.kernel import GIVEN, MARKS, Given, Marks, step_with, take_actions
+from uas_coverage_env.env.gpu.refused import Asked, refuse
 from uas_coverage_env.env.observation.layout import observation_bounds
 from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.scenario import Scenario
@@ -110,7 +110,7 @@ class CudaMissions:
         flat_infos = settings.get("flat_infos")
         if isinstance(scenario, str | Path | Scenario) and scenario not in installed_families():
             scenario = loaded_scenario(scenario)
-        refuse(Given(scenario, told, flat_infos, autoreset_mode, threads, render_mode))
+        refuse(Asked(scenario, told, flat_infos, autoreset_mode, threads, render_mode))
         check_gpu()
         assert isinstance(scenario, Scenario)
         self.num_envs = num_envs
@@ -136,11 +136,11 @@ class CudaMissions:
             on_device(paying_of(told.reward, told.weights, told.reward)),
             on_device(observing_of(told.observation, told.observation)),
         )
-        self._launched = step_with(
+        self._launches = step_with(
             told, pool.features, pool.sizes["true vehicles"] > 0, pool.changes
         )
+        self._numbers: Any = self._handed_over()
         self._observing = observing_of(told.observation, version.observation)  # on the host
-        self._blocks = -(-num_envs // THREADS_PER_BLOCK), THREADS_PER_BLOCK
         self._begun = False
 
         lanes, learners = self.missions.lanes, self.missions.learners
@@ -203,7 +203,7 @@ class CudaMissions:
             given = as_device_array(actions)
             if given.shape != self.asked.shape:
                 raise ValueError(f"actions have shape {given.shape}; give {self.asked.shape}")
-            take_actions[self._blocks](given, self.asked)
+            take_actions[self._blocks(of_uas=False)](given, self.asked)
         elif actions is not None:
             here = np.zeros(self.missions.learners.asked.shape)
             accept_of_lanes(self._pool.actions, actions, here)
@@ -244,12 +244,21 @@ class CudaMissions:
         write(lanes.scene, scene)
         write(self.ended, state["terminated"] | state["truncated"])
         self._pool_there = on_device(pool.arrays)
+        self._numbers = self._handed_over()
         self._begun = bool((state["mission"] >= 0).all())
 
     def _launch(self) -> None:
-        self._launched[self._blocks](
-            self._pool_there, self.missions, self._marks, *self._parts, self._rows
-        )
+        for kernel, of_uas in self._launches:
+            kernel[self._blocks(of_uas)](self._numbers)
+
+    def _blocks(self, of_uas: bool) -> tuple[int, int]:
+        """How many blocks of how many threads are launched."""
+        n_threads = self.num_envs * (self.n_uas if of_uas else 1)
+        return -(-n_threads // THREADS_PER_BLOCK), THREADS_PER_BLOCK
+
+    def _handed_over(self) -> Any:
+        given = Given(self._pool_there, self.missions, self._marks, *self._parts, self._rows)
+        return on_device(GIVEN.numbers_of(given))
 
     def _change_scenes(self) -> None:
         """Lay out anew on the host, as a batch does, the scenes that change at this sample."""
@@ -277,3 +286,4 @@ class CudaMissions:
                 arenas=with_missions(self._pool_there.arenas, ARENA, arenas, changed),
                 tables=with_missions(self._pool_there.tables, TABLES, tables, changed),
             )
+            self._numbers = self._handed_over()

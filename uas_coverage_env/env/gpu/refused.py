@@ -12,7 +12,7 @@ from uas_coverage_env.world.events import goes_home
 _OWN_MODE = (AutoresetMode.NEXT_STEP, AutoresetMode.NEXT_STEP.value)
 
 
-class Given(NamedTuple):
+class Asked(NamedTuple):
     """What missions on a GPU are asked for."""
 
     scenario: Any
@@ -29,7 +29,7 @@ class Refusal(NamedTuple):
 
     what: str
     instead: str
-    is_asked_for: Callable[[Given], bool]
+    is_asked_for: Callable[[Asked], bool]
 
 
 REFUSED = (
@@ -77,14 +77,14 @@ REFUSED = (
     ),
     Refusal(
         "`threads` other than 1",
-        "leave it out: every mission has a thread of the GPU",
+        "leave it out: every UAS has a thread of the GPU",
         lambda given: given.threads != 1,
     ),
 )
 """In the order in which they are looked for."""
 
 
-def refuse(given: Given) -> None:
+def refuse(given: Asked) -> None:
     """Refuse what does not run on a GPU.
 
     Raises:
