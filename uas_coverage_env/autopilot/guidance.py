@@ -13,11 +13,13 @@ from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.exit_overhang import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.autopilot.low_altitude_return import low_way
+from uas_coverage_env.autopilot.room import new_room
 from uas_coverage_env.compiled.kernels import (
     allocating_kernel,
     inlined_kernel,
     kernel,
     rare_kernel,
+    stack_array,
 )
 from uas_coverage_env.entities.commands import GO_TO, HOME, VELOCITY, GoTo, Velocity, command_mode
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
@@ -238,8 +240,8 @@ def _altitude(arena, i, x, altitude1_m, way_m, needed_m):
     return min(max(altitude_m, floor_m), max(rules.ceiling_m, altitude1_m))
 
 
-@allocating_kernel(forceinline=True)
-def _next_leg(arena, i, x, target, stop, belief):
+@inlined_kernel
+def _next_leg(arena, i, x, target, stop, belief, room):
     """What is flown next on the way to a target, and how it ends.
 
     Returns:
@@ -250,8 +252,10 @@ def _next_leg(arena, i, x, target, stop, belief):
     row, x1, y1, z1 = target_position(arena, i, target)
     end_x, end_y, way_m, leg = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
     if leg != CLEAR and arena.rules[0].overhangs:
-        place_m = np.empty(3)
-        first = past_overhangs(arena, i, x[S.X], x[S.Y], x[S.Z], x1, y1, z1, place_m)
+        place_m = stack_array(3)
+        first = past_overhangs(
+            arena, i, x[S.X], x[S.Y], x[S.Z], x1, y1, z1, room.places_m, room.cells, place_m
+        )
         if first != LEG_TO_TARGET:
             x1, y1, z1 = place_m[0], place_m[1], place_m[2]
             end_x, end_y, way_m, leg = x1, y1, 0.0, CLEAR
@@ -311,9 +315,9 @@ def _write_safe(
     write_brake(command)
 
 
-@allocating_kernel
+@kernel
 def guide(
-    arena, i, x, reference, target, stop, nonlinear, command, belief=None, climb_m=0.0
+    room, arena, i, x, reference, target, stop, nonlinear, command, belief=None, climb_m=0.0
 ):  # fmt: skip
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 
@@ -321,6 +325,7 @@ def guide(
     brake. On the way home in a wind that it hardly gets ahead against, a UAS flies low.
 
     Args:
+        room: `Room`; written.
         arena: The mission.
         i: Index of the UAS.
         x: (14,) its state.
@@ -332,14 +337,14 @@ def guide(
         belief: (N_BELIEF,) of its inner loop; None: in still air.
         climb_m: By how much to climb above where it is; 0: it flies at the height of the way [m].
     """
-    end_x, end_y, altitude1_m, way_m, leg, stop = _next_leg(arena, i, x, target, stop, belief)
+    end_x, end_y, altitude1_m, way_m, leg, stop = _next_leg(arena, i, x, target, stop, belief, room)
+    path_m = room.path_m
     lead_s = LEAD_S
     if not stop:
         left_m = math.hypot(end_x - x[S.X], end_y - x[S.Y])
         lead_s = min(LEAD_S, _LEAD_SHARE * left_m / (math.hypot(x[S.VX], x[S.VY]) + _NOWHERE_M))
     ahead_x = end_x - x[S.X] - lead_s * x[S.VX]
     ahead_y = end_y - x[S.Y] - lead_s * x[S.VY]
-    path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
     brakes_late = _brakes_late(arena, i, belief, target, leg)
     if brakes_late:
         _brake(arena, i, x, reference, nonlinear, path_m, belief)
@@ -363,29 +368,36 @@ def guide(
     )  # fmt: skip
 
 
+@kernel
+def steer_of(arena, state, nonlinear, outcome, i, room):
+    """`steer` for one UAS; `Room` is written."""
+    if state.uas[i].status != FLYING:
+        return
+    command = outcome[i].applied_command
+    if state.uas[i].returning:
+        command.kind = GO_TO
+        command.values[0] = HOME
+        command.values[1] = 0.0
+        command.returning = True
+        outcome[i].returning = True
+    if command.kind == GO_TO:
+        target = int(command.values[0])
+        stop = comes_to_rest(arena, state, target)
+        guide(
+            room, arena, i, state.x[i], state.uas[i].reference_mps[:], target, stop, nonlinear,
+            command, state.uas[i].belief[:], command.values[1],
+        )  # fmt: skip
+
+
 @allocating_kernel
 def steer(arena, state, nonlinear, outcome):
     """Resolve commands that name a place into velocities; a UAS called home gets such a command.
 
     Of the outcome, applied_command and returning are written.
     """
+    room = new_room(arena)
     for i in range(state.uas.shape[0]):
-        if state.uas[i].status != FLYING:
-            continue
-        command = outcome[i].applied_command
-        if state.uas[i].returning:
-            command.kind = GO_TO
-            command.values[0] = HOME
-            command.values[1] = 0.0
-            command.returning = True
-            outcome[i].returning = True
-        if command.kind == GO_TO:
-            target = int(command.values[0])
-            stop = comes_to_rest(arena, state, target)
-            guide(
-                arena, i, state.x[i], state.uas[i].reference_mps[:], target, stop, nonlinear,
-                command, state.uas[i].belief[:], command.values[1],
-            )  # fmt: skip
+        steer_of(arena, state, nonlinear, outcome, i, room)
 
 
 def velocity_of(

@@ -121,6 +121,17 @@ def has_to_return(arena, state, i):
 
 
 @kernel
+def call_home_of(arena, state, i):
+    """`call_home` for one UAS."""
+    if state.uas[i].status != FLYING:
+        return
+    if not state.uas[i].returning:
+        state.uas[i].returning = has_to_return(arena, state, i)
+    elif arena.rules[0].disturbed:
+        state.uas[i].returning = _calls_home(arena, state, i, _AMPLE, _AMPLE_S)
+
+
+@kernel
 def call_home(arena, state, nonlinear, outcome):
     """Call those home that have to return; in still air they fly home from then on.
 
@@ -128,9 +139,4 @@ def call_home(arena, state, nonlinear, outcome):
     It goes back to work when that is over, if charge and time are ample.
     """
     for i in range(state.uas.shape[0]):
-        if state.uas[i].status != FLYING:
-            continue
-        if not state.uas[i].returning:
-            state.uas[i].returning = has_to_return(arena, state, i)
-        elif arena.rules[0].disturbed:
-            state.uas[i].returning = _calls_home(arena, state, i, _AMPLE, _AMPLE_S)
+        call_home_of(arena, state, i)

@@ -148,22 +148,19 @@ class WorldStages(NamedTuple):
 
 
 @inlined_kernel
-def _prepare_still(arena, state, commands, nonlinear, assistants, code, outcome, i):
-    begin_step_of(state, commands, outcome, i)
-
-
-@inlined_kernel
-def _move_still(arena, state, nonlinear, code, outcome, i):
-    fly_still_of(arena, state, i, outcome)
+def _assist_all(assistants, arena, measured, nonlinear, outcome):
+    for k in range(len(assistants)):
+        assist(assistants[k], arena, measured, nonlinear, outcome)
 
 
 @cache
-def stages_with(call_features: Any, fly: Any) -> WorldStages:
+def stages_with(call_features: Any, fly: Any, assist_all: Any = _assist_all) -> WorldStages:
     """The stages of a step of the world, made of these functions.
 
     Args:
         call_features: See `points.call_features`.
         fly: See `flight.fly`.
+        assist_all: Calls the assistants.
     """
 
     @inlined_kernel
@@ -171,9 +168,7 @@ def stages_with(call_features: Any, fly: Any) -> WorldStages:
         begin_step(state, commands, outcome)
         call_features(COMMAND, arena, state, code, outcome)
         if assistants is not None:
-            measured = as_measured(state)
-            for k in range(len(assistants)):
-                assist(assistants[k], arena, measured, nonlinear, outcome)
+            assist_all(assistants, arena, as_measured(state), nonlinear, outcome)
 
     @inlined_kernel
     def move(arena, state, nonlinear, code, outcome):
@@ -189,10 +184,28 @@ def stages_with(call_features: Any, fly: Any) -> WorldStages:
     return WorldStages(prepare, move, judge)
 
 
-def plain_stages_with(call_features: Any) -> WorldStages:
-    """`stages_with`, where nothing acts on how UAS fly: in still air, by the linear model."""
+@inlined_kernel
+def _move_still(arena, state, nonlinear, code, outcome, i):
+    fly_still_of(arena, state, i, outcome)
+
+
+@cache
+def plain_stages_with(call_features: Any, assist_one: Any) -> WorldStages:
+    """`stages_with`, where nothing acts on how UAS fly: in still air, by the linear model.
+
+    Args:
+        call_features: See `points.call_features`.
+        assist_one: Assists a UAS.
+    """
+
+    @inlined_kernel
+    def prepare(arena, state, commands, nonlinear, assistants, code, outcome, i):
+        begin_step_of(state, commands, outcome, i)
+        if assistants is not None:
+            assist_one(assistants, arena, as_measured(state), nonlinear, outcome, i)
+
     judge = stages_with(call_features, fly).judge
-    return WorldStages(OfUas(_prepare_still), OfUas(_move_still), judge)
+    return WorldStages(OfUas(prepare), OfUas(_move_still), judge)
 
 
 STAGES = stages_with(call_features, fly)

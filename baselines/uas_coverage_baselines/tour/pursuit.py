@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target_position
 from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_kinematically
+from uas_coverage_env.autopilot.room import new_room
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import CLIMB, VELOCITY
 from uas_coverage_env.geometry.segments import signed_distance
@@ -263,7 +264,7 @@ def push_to_guidance(arena, i, task, plan, command, belief=None):
         if done < len(task.route):
             target = task.route[done]
             stop = task.cover_m[done] < 0.0 or arena.waypoints[target].asks
-        guide(arena, i, x, plan.reference[k], target, stop, False, command, belief)
+        guide(new_room(arena), arena, i, x, plan.reference[k], target, stop, False, command, belief)
         altitude_m = command.values[2] if command.kind == VELOCITY else -x[S.Z]
         plan.push[k, 0] = command.values[0] - plan.commands[k, 0]
         plan.push[k, 1] = command.values[1] - plan.commands[k, 1]

@@ -37,7 +37,7 @@ class Rules(NamedTuple):
     nonlinear: int
     """Whether the 6-DOF plant is flown, as a number."""
     assistants: Any
-    """Which help to fly, see `autopilot.assist`; None on a GPU."""
+    """Which help to fly, see `autopilot.assist`; on a GPU `Room` for guidance, or None."""
     code: Any
     """What features do, see `simulation.points.FeatureCode`; None on a GPU."""
     paying: Paying

@@ -1,13 +1,15 @@
 """One step of many missions on a GPU: the stages of a batch's step, by a thread a UAS or a mission.
 
 Numba compiles the same functions for a GPU that it compiles for the processor. It calls nothing at
-an address there, so all kernels of observation, reward, action and features are part of the step.
-What cannot run there is what makes arrays: guidance, return mode and safety filter.
+an address there, so all kernels of observation, reward, action and features are part of the step,
+and guidance and return mode where they are asked for. What cannot run there is what makes arrays:
+the safety filter, and the search for a way past overhangs.
 
 A step is a few launches, one after the other. What each UAS does whatever the others do (`OfUas`,
 and what it observes) has a thread for each UAS; the rest has one for each mission.
 """
 
+from collections.abc import Mapping
 from functools import cache
 from itertools import groupby
 from typing import Annotated, Any, NamedTuple
@@ -16,9 +18,10 @@ import numpy as np
 from numba import cuda
 from numpy.typing import NDArray
 
+from uas_coverage_env.autopilot.room import ROOM, Room
 from uas_coverage_env.compiled.kernels import in_turn, inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory
-from uas_coverage_env.compiled.views import Handover, rows_view
+from uas_coverage_env.compiled.views import Handover, lane_view, rows_view
 from uas_coverage_env.entities.state import FLYING, as_observed
 from uas_coverage_env.env.batch.kernel import scratch_of
 from uas_coverage_env.env.batch.lane import finish_lane_with, keep_lane_with
@@ -28,12 +31,11 @@ from uas_coverage_env.env.episode.act import begin_command, first_not_finite, re
 from uas_coverage_env.env.episode.memory import ACTING, OBSERVING, PAYING, Acting, Observing, Paying
 from uas_coverage_env.env.episode.observe import LOOK, looks_with
 from uas_coverage_env.env.episode.pay import compute_rewards_with
-from uas_coverage_env.env.episode.settings import MissionSettings
 from uas_coverage_env.env.episode.step import ACCEPTED, STAGE, Rules, stages_of
-from uas_coverage_env.features.feature import MissionFeature
 from uas_coverage_env.simulation.on_gpu import begin_features_of, stages_on_gpu
 from uas_coverage_env.simulation.pool import arena_of, state_of
 from uas_coverage_env.simulation.step import OfUas
+from uas_coverage_env.world.arena import ARENA
 
 
 class Marks(NamedTuple):
@@ -63,6 +65,8 @@ class Given(NamedTuple):
     acting: Acting
     paying: Paying
     observing: Observing
+    rooms: Room
+    """Of guidance, with an axis of all UAS of all lanes in front; of none without it."""
     observation: NDArray[np.float32]
     """(L, U, V)."""
 
@@ -70,10 +74,20 @@ class Given(NamedTuple):
 def _example() -> Given:
     pool = ScenarioPool("open_field")
     none = dict.fromkeys((*ACTING.names, *PAYING.names, *OBSERVING.names), 0)
-    parts = (memory.zeros(none) for memory in (ACTING, PAYING, OBSERVING))
     missions, marks = new_missions(pool.sizes, 1, 1), MARKS.zeros({"L": 1})
-    return Given(pool.arrays, missions, marks, *parts, np.zeros((1, 1, 1), np.float32))
+    seen = np.zeros((1, 1, 1), np.float32)
+    return Given(
+        pool.arrays, missions, marks, ACTING.zeros(none), PAYING.zeros(none),
+        OBSERVING.zeros(none), new_rooms(pool.sizes, 0), seen,
+    )  # fmt: skip
 
+
+def new_rooms(sizes: Mapping[str, int], n: int) -> Room:
+    """For n UAS, whose missions have no overhangs."""
+    return ROOM.zeros({**sizes, "places": 0, "cells": 0}, lanes=n)
+
+
+_room_of = lane_view(ROOM, sized_by=ARENA)
 
 GIVEN = Handover(_example)
 """How kernels are given it: numba takes a millisecond to hand over a hundred arrays."""
@@ -158,7 +172,7 @@ def _begin_with(choices: int, width: int) -> Any:
 
 
 @cache
-def _fly_with(stages: tuple[Any, ...], nonlinear: bool) -> Any:
+def _fly_with(stages: tuple[Any, ...], nonlinear: bool, guided: bool) -> Any:
     """The part of a mission, or of a UAS, that flies through stages one after the other."""
     of_uas = isinstance(stages[0], OfUas)
     kernels = [stage.kernel for stage in stages] if of_uas else stages
@@ -174,7 +188,11 @@ def _fly_with(stages: tuple[Any, ...], nonlinear: bool) -> Any:
         state = state_of(missions.worlds, lane, pool.arenas, s)
         learners = learners_of(missions.learners, lane, pool.arenas, s)
         scratch = scratch_of(missions.scratch, lane, pool.arenas, s)
-        rules = Rules(given.acting, nonlinear, None, None, given.paying, given.observing)
+        room = None
+        if guided:
+            k = lane * given.observation.shape[1] + i
+            room = _room_of(given.rooms, k, pool.arenas, s)
+        rules = Rules(given.acting, nonlinear, room, None, given.paying, given.observing)
         if not of_uas:
             run(arena, state, tables, learners, scratch, rules)
         elif i < state.uas.shape[0]:
@@ -233,37 +251,41 @@ def _look_with(looks: tuple[Any, ...], width: int) -> Any:
     return look
 
 
-def step_with(
-    settings: MissionSettings, features: tuple[MissionFeature, ...], otherwise: bool, changes: bool
-) -> tuple[Launch, ...]:
+def is_guided(pool: ScenarioPool) -> bool:
+    """Whether a step needs guidance."""
+    settings = pool.settings
+    return settings.kind.goes_to or settings.return_mode or pool.goes_home
+
+
+def step_with(pool: ScenarioPool) -> tuple[Launch, ...]:
     """The step of all lanes, to be launched one part after the other.
 
-    Observations are written where those of the step before lie.
+    Observations are written where those of the step before lie. All kernels of the settings are
+    part of the step.
 
     Args:
-        settings: How missions are flown and paid; all of its kernels are part of the step.
-        features: What the mission has of what few missions have.
-        otherwise: Whether others are flown than are believed.
-        changes: Whether the scene may change.
+        pool: What is flown.
     """
+    settings, features = pool.settings, pool.features
     nonlinear, width = settings.dynamics == "nonlinear", settings.observation_size
     write = settings.kind.write
     own = all(write is not kind.write for kind in settings.version.actions)
     stages = stages_of(
         _write_command_with(write, own),
-        stages_on_gpu(features, nonlinear or otherwise),
+        stages_on_gpu(features, nonlinear or pool.sizes["true vehicles"] > 0, settings.return_mode),
         compute_rewards_with(settings.reward, calls=False),
         looks_with(settings.observation, calls=False),
     )
-    flights = [tuple(group) for _, group in groupby(stages.flight, _is_of_uas)]
-    parts = (
-        (False, _begin_with(settings.kind.choices, width)),
-        *((_is_of_uas(stage[0]), _fly_with(stage, nonlinear)) for stage in flights),
-        (False, _finish_with(begin_features_of(features), width, changes)),
-        (True, _look_with(stages.looks, width)),
-    )
+    parts = [(False, _begin_with(settings.kind.choices, width))]
+    for of_uas, group in groupby(stages.flight, _is_of_uas):
+        parts.append((of_uas, _fly_with(tuple(group), nonlinear, is_guided(pool))))
     together = groupby(parts, lambda part: part[0])
-    return tuple(_launch(of_uas, tuple(run for _, run in group)) for of_uas, group in together)
+    launches = [_launch(of_uas, tuple(run for _, run in group)) for of_uas, group in together]
+    finish = _finish_with(begin_features_of(features), width, pool.changes)
+    # apart from one another they need fewer registers, so that more UAS look at once
+    looks = (stages.looks[:2], *((look,) for look in stages.looks[2:]))
+    apart = [_launch(True, (_look_with(each, width),)) for each in looks]
+    return (*launches, _launch(False, (finish,)), *apart)
 
 
 def _is_of_uas(stage: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Many missions of one scenario on a GPU: the batch's missions, in the memory of the GPU.
+"""Many missions on a GPU: the batch's missions, in the memory of the GPU.
 
 In double precision, as on the processor; the GPU's own roots and exponentials may differ in the
 last digit. Without a GPU, numba's simulator runs it: `NUMBA_ENABLE_CUDASIM=1`, for tests.
@@ -38,7 +38,16 @@ from uas_coverage_env.env.gpu.device import (
     write,
     write_lane,
 )
-from uas_coverage_env.env.gpu.kernel import GIVEN, MARKS, Given, Marks, step_with, take_actions
+from uas_coverage_env.env.gpu.kernel import (
+    GIVEN,
+    MARKS,
+    Given,
+    Marks,
+    is_guided,
+    new_rooms,
+    step_with,
+    take_actions,
+)
 from uas_coverage_env.env.gpu.refused import Asked, refuse
 from uas_coverage_env.env.observation.layout import observation_bounds
 from uas_coverage_env.env.versions import V0, Version
@@ -51,7 +60,7 @@ THREADS_PER_BLOCK: int = 64
 
 
 class CudaMissions:
-    """N missions of one scenario on the GPU; what flies in one is what a batch flies.
+    """N missions on the GPU; what flies in one is what a batch flies.
 
     A mission that has ended begins anew in the step after, whatever it is asked. Nothing leaves the
     GPU in a step, unless the scene of missions changes (events): the arrays below are those that
@@ -61,7 +70,8 @@ class CudaMissions:
 
     Args:
         num_envs: N.
-        scenario: Name of a shipped scenario, path of a scenario file, or a scenario.
+        scenario: Name of a shipped scenario, path of a scenario file, or a scenario; or a sequence
+            of these, from which each lane draws as a lane of a batch does.
         version: Of the environments.
         autoreset_mode: "NextStep".
         threads: 1.
@@ -109,12 +119,17 @@ class CudaMissions:
         told = MissionSettings.of(settings, version)
         flat_infos = settings.get("flat_infos")
         if isinstance(scenario, str | Path | Scenario) and scenario not in installed_families():
-            scenario = loaded_scenario(scenario)
-        refuse(Asked(scenario, told, flat_infos, autoreset_mode, threads, render_mode))
-        check_gpu()
-        assert isinstance(scenario, Scenario)
+            scenario = [scenario]
+        if isinstance(scenario, Sequence) and not isinstance(scenario, str):
+            scenario = tuple(map(loaded_scenario, scenario))
+        asked = Asked(scenario, told, flat_infos, autoreset_mode, threads, render_mode)
+        refuse(asked)
+        assert isinstance(scenario, tuple)
         self.num_envs = num_envs
         self._pool = pool = ScenarioPool(scenario, told, lanes=num_envs)
+        self._asked = asked
+        self._refuse_overhangs()
+        check_gpu()
         self.n_uas = n_uas = pool.sizes["U"]
         low, high = (np.tile(bound, n_uas) for bound in observation_bounds(told.observation))
         self.single_observation_space = spaces.Box(low, high, dtype=np.float32)
@@ -136,9 +151,8 @@ class CudaMissions:
             on_device(paying_of(told.reward, told.weights, told.reward)),
             on_device(observing_of(told.observation, told.observation)),
         )
-        self._launches = step_with(
-            told, pool.features, pool.sizes["true vehicles"] > 0, pool.changes
-        )
+        self._rooms = on_device(new_rooms(pool.sizes, num_envs * n_uas if is_guided(pool) else 0))
+        self._launches = step_with(pool)
         self._numbers: Any = self._handed_over()
         self._observing = observing_of(told.observation, version.observation)  # on the host
         self._begun = False
@@ -257,8 +271,15 @@ class CudaMissions:
         return -(-n_threads // THREADS_PER_BLOCK), THREADS_PER_BLOCK
 
     def _handed_over(self) -> Any:
-        given = Given(self._pool_there, self.missions, self._marks, *self._parts, self._rows)
+        given = Given(
+            self._pool_there, self.missions, self._marks, *self._parts, self._rooms, self._rows
+        )
         return on_device(GIVEN.numbers_of(given))
+
+    def _refuse_overhangs(self) -> None:
+        """Refuse to guide UAS past what there is no room for."""
+        overhangs = self._pool.arrays.arenas.arrays.rules["overhangs"].any()
+        refuse(self._asked._replace(overhangs=is_guided(self._pool) and bool(overhangs)))
 
     def _change_scenes(self) -> None:
         """Lay out anew on the host, as a batch does, the scenes that change at this sample."""
@@ -281,6 +302,7 @@ class CudaMissions:
                 write_lane(there, lane, here)
                 changed.append(int(here.scene[0]))
         if changed:
+            self._refuse_overhangs()
             arenas, tables = pool.arrays.arenas, pool.arrays.tables
             self._pool_there = self._pool_there._replace(
                 arenas=with_missions(self._pool_there.arenas, ARENA, arenas, changed),

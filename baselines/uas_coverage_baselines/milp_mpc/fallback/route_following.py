@@ -23,6 +23,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.autopilot.guidance import guide
 from uas_coverage_env.autopilot.return_path import flight_home
+from uas_coverage_env.autopilot.room import new_room
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
 from uas_coverage_env.mission import MissionBrief
@@ -224,7 +225,7 @@ def _pursued(arena, i, start, target, pursued, steps, commands):
     states[0] = x
     for step in range(steps):
         if step < pursued:
-            guide(arena, i, x, reference, target, True, False, command)
+            guide(new_room(arena), arena, i, x, reference, target, True, False, command)
             command_wrench(vehicle, x, reference, command, inputs[step])
         else:
             velocity_climb_wrench(vehicle, x, reference, 0.0, 0.0, 0.0, inputs[step])
