@@ -96,6 +96,9 @@ class CudaMissions:
         acted: (N,) int64, agent-steps flown since the beginning.
         asked: (N, U · size) float64, the actions of the coming step; to be written in place.
         missions: All arrays of the batch, see `Missions`; to be read only.
+        settings: How missions are flown and paid.
+        launches: What a step launches, in turn.
+        numbers: What each of them is launched with.
 
     Raises:
         ValueError: An argument is none of what is allowed.
@@ -116,7 +119,7 @@ class CudaMissions:
     ) -> None:
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs is {num_envs!r}; give a whole number from 1 on")
-        told = MissionSettings.of(settings, version)
+        self.settings = told = MissionSettings.of(settings, version)
         flat_infos = settings.get("flat_infos")
         if isinstance(scenario, str | Path | Scenario) and scenario not in installed_families():
             scenario = [scenario]
@@ -152,8 +155,8 @@ class CudaMissions:
             on_device(observing_of(told.observation, told.observation)),
         )
         self._rooms = on_device(new_rooms(pool.sizes, num_envs * n_uas if is_guided(pool) else 0))
-        self._launches = step_with(pool)
-        self._numbers: Any = self._handed_over()
+        self.launches = step_with(pool)
+        self.numbers: Any = self._handed_over()
         self._observing = observing_of(told.observation, version.observation)  # on the host
         self._begun = False
 
@@ -258,12 +261,12 @@ class CudaMissions:
         write(lanes.scene, scene)
         write(self.ended, state["terminated"] | state["truncated"])
         self._pool_there = on_device(pool.arrays)
-        self._numbers = self._handed_over()
+        self.numbers = self._handed_over()
         self._begun = bool((state["mission"] >= 0).all())
 
     def _launch(self) -> None:
-        for kernel, of_uas in self._launches:
-            kernel[self._blocks(of_uas)](self._numbers)
+        for kernel, of_uas in self.launches:
+            kernel[self._blocks(of_uas)](self.numbers)
 
     def _blocks(self, of_uas: bool) -> tuple[int, int]:
         """How many blocks of how many threads are launched."""
@@ -308,4 +311,4 @@ class CudaMissions:
                 arenas=with_missions(self._pool_there.arenas, ARENA, arenas, changed),
                 tables=with_missions(self._pool_there.tables, TABLES, tables, changed),
             )
-            self._numbers = self._handed_over()
+            self.numbers = self._handed_over()
