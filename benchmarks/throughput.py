@@ -4,7 +4,6 @@
     python benchmarks/throughput.py --peers all --cache DIR  beside mpe2, VMAS and JaxMARL
     python benchmarks/throughput.py --against PYTHON --drawn beside another version of ours
     python benchmarks/throughput.py --threads 1,2 --json FILE
-    python benchmarks/throughput.py --cuda --envs 1024,16384,131072     on a GPU too
     python benchmarks/throughput.py --profile                where the time of our step goes
 
 Each environment is a process of its own (`throughput_case.py`). They take turns, so that whatever
@@ -134,7 +133,6 @@ def cases_of(
     threads: list[int],
     peers: list[str],
     *,
-    cuda: bool = False,
     drawn: bool = False,
     against: bool = False,
 ) -> list[Case]:
@@ -144,7 +142,6 @@ def cases_of(
         envs: Numbers of environments.
         threads: Numbers of threads.
         peers: Libraries.
-        cuda: On the GPU too.
         drawn: Those of `DRAWN` too.
         against: Each of ours a second time, for another interpreter.
     """
@@ -161,8 +158,6 @@ def cases_of(
             ]
         if drawn:
             cases += [Case(name, DRAWN_ENVS, n_threads) for name in DRAWN]
-    if cuda:
-        cases += [Case("village-cuda", num_envs, 1) for num_envs in envs]
     if against:
         ours = [case for case in cases if case.peer is None]
         cases += [Case(case.name, case.num_envs, case.threads, AGAINST) for case in ours]
@@ -331,7 +326,6 @@ def main(
     drawn: Annotated[
         bool, typer.Option("--drawn", help=f"Missions that are drawn too, {DRAWN_ENVS} at once.")
     ] = False,
-    cuda: Annotated[bool, typer.Option("--cuda", help="On the GPU of this machine too.")] = False,
     profile: Annotated[
         bool, typer.Option("--profile", help="Only show where the time of our step goes.")
     ] = False,
@@ -356,7 +350,7 @@ def main(
         )
         raise typer.Exit(2)
     n_envs, n_threads = ([int(part) for part in text.split(",")] for text in (envs, threads))
-    cases = cases_of(n_envs, n_threads, chosen, cuda=cuda, drawn=drawn, against=against is not None)
+    cases = cases_of(n_envs, n_threads, chosen, drawn=drawn, against=against is not None)
     failed = measure(cases, turns, seconds, cache, clock, against)
     console.print(table_of(cases))
     for _, why in failed:

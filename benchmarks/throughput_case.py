@@ -17,10 +17,10 @@ import resource
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 N_DRAWN = 32
-N_ON_GPU = 4
 N_AGENTS = 2
 N_SCENARIOS = 64
 """So many are drawn, before the clock starts, from which the missions of a batch are drawn."""
@@ -158,34 +158,6 @@ def _village_sync(num_envs: int, threads: int) -> Steps:
     return _vector(env, flying, num_envs * N_AGENTS)
 
 
-def _village_cuda(num_envs: int, threads: int) -> Steps:
-    import numpy as np
-    from numba import cuda
-
-    from uas_coverage_env import uas_coverage_v0
-
-    flown: Any = uas_coverage_v0.vector_env(num_envs, device="cuda")
-    flown.reset(seed=0)
-    rng = np.random.default_rng(0)
-    # actions lie on the GPU already, as those of a learner there would
-    drawn = [
-        cuda.to_device(rng.uniform(-1, 1, flown.asked.shape).astype(np.float32))
-        for _ in range(N_ON_GPU)
-    ]
-
-    def steps(n_steps: int) -> Callable[[], tuple[float, float]]:
-        before = int(flown.acted.copy_to_host().sum())
-        for step in range(n_steps):
-            flown.step(drawn[step % N_ON_GPU])
-        cuda.synchronize()
-        return lambda: (
-            int(flown.acted.copy_to_host().sum()) - before,
-            n_steps * num_envs * N_AGENTS,
-        )
-
-    return steps
-
-
 def _mpe2_dict(num_envs: int, threads: int) -> Steps:
     from mpe2 import simple_spread_v3
 
@@ -194,13 +166,13 @@ def _mpe2_dict(num_envs: int, threads: int) -> Steps:
     )
 
 
-def _vmas(num_envs: int, threads: int) -> Steps:
+def _vmas(num_envs: int, threads: int, device: str = "cpu") -> Steps:
     import torch
     import vmas
 
     torch.set_num_threads(threads)
     env = vmas.make_env(
-        "simple_spread", num_envs=num_envs, device="cpu", continuous_actions=True, max_steps=100,
+        "simple_spread", num_envs=num_envs, device=device, continuous_actions=True, max_steps=100,
         seed=0, n_agents=N_AGENTS,
     )  # fmt: skip
     env.reset()
@@ -215,6 +187,8 @@ def _vmas(num_envs: int, threads: int) -> Steps:
             if since_reset == 100:
                 env.reset()
                 since_reset = 0
+        if device == "cuda":
+            torch.cuda.synchronize()
         rows = n_steps * num_envs * N_AGENTS
         return lambda: (rows, rows)
 
@@ -261,9 +235,9 @@ CASES: dict[str, Callable[[int, int], Steps]] = {
     "streets": _streets,
     "hard": _hard,
     "own-scenes": _own_scenes,
-    "village-cuda": _village_cuda,
     "mpe2-dict": _mpe2_dict,
     "vmas": _vmas,
+    "vmas-cuda": partial(_vmas, device="cuda"),
     "jaxmarl": _jaxmarl,
 }
 

@@ -58,7 +58,8 @@ class _Parts:
         self._parts = block_parts_with(V0, self.observation.shape[2])
         blocks = blocks_of_looks(V0.observation)
         looks = ["nearest waypoints", *(", ".join(each.name for each in group) for group in blocks)]
-        names = [_STAGES[stage.__name__] for stage in stages_with(V0).flight]
+        flight = (getattr(stage, "kernel", stage) for stage in stages_with(V0).flight)
+        names = [_STAGES[stage.__name__] for stage in flight]
         names += [f"observation: {name.replace('_', ' ')}" for name in looks]
         self._loops = dict(zip(names, self._parts.loops, strict=True))
         self._clock_s = self._cost_of_clock()

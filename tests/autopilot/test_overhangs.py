@@ -7,7 +7,7 @@ import pytest
 from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env import load_scenario, rollout
-from uas_coverage_env.autopilot.exit_overhang import way_out
+from uas_coverage_env.autopilot.exit_overhang import N_CELLS, way_out
 from uas_coverage_env.entities.state import LANDED
 from uas_coverage_env.flight.record import LANDED as FLIGHT_LANDED
 from uas_coverage_env.simulation import World
@@ -89,7 +89,8 @@ def test_between_crowns_that_touch_there_is_a_way_out():
 def test_the_way_out_is_clear_and_ends_where_a_uas_can_climb():
     arena = World(meadow([START_M], obstacles=[SLAB])).arena
     places_m = np.empty((100, 3))
-    count = way_out(arena, 0, 84.0, 130.0, -4.0, 100.0, 60.0, places_m)
+    cells = np.empty((3, N_CELLS), np.int32)
+    count = way_out(arena, 0, 84.0, 130.0, -4.0, 100.0, 60.0, places_m, cells)
     assert 0 < count < 20
     end_m = places_m[count - 1]
     assert not is_below_overhang(arena, *end_m)
@@ -107,7 +108,8 @@ def test_closed_in_on_all_sides_there_is_no_way_out():
     ]
     arena = World(meadow([START_M], obstacles=walls)).arena
     assert is_below_overhang(arena, 100.0, 110.0, -5.0)
-    assert way_out(arena, 0, 100.0, 110.0, -5.0, 100.0, 60.0, np.empty((100, 3))) == 0
+    written = np.empty((100, 3)), np.empty((3, N_CELLS), np.int32)
+    assert way_out(arena, 0, 100.0, 110.0, -5.0, 100.0, 60.0, *written) == 0
 
 
 @pytest.mark.parametrize("case", sorted((Path(__file__).parent / "cases").glob("*.toml")))

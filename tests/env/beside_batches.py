@@ -4,7 +4,7 @@ import numpy as np
 
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.gpu.missions import CudaMissions
-from uas_coverage_env.env.report import CONTACT
+from uas_coverage_env.env.report import CONTACT, RETURNING
 from uas_coverage_env.mission import MissionBrief
 
 SEED, N_LANES = 7, 2
@@ -37,7 +37,7 @@ def compare(scenario, asked, n_steps, **settings):
     missions.reset(seed=SEED)
     batch.reset(SEED)
     not_equal = different(missions.state_dict(), batch.state_dict())
-    seen, changes = [], set()
+    seen, changes, returned, scenarios = [], set(), False, []
     for k in range(n_steps):
         actions = asked(k) if callable(asked) else np.array([asked] * N_LANES)
         missions.step(actions)
@@ -46,8 +46,11 @@ def compare(scenario, asked, n_steps, **settings):
         not_equal |= different(here, there)
         not_equal |= set() if briefs_of(missions) == briefs_of(batch) else {"scenario_of"}
         changes |= set(there.get("changes", np.zeros(0)).ravel().tolist()) - {-1}
-        report = np.array(missions.report)[:, :, CONTACT]
-        seen.append((set(there["uas.status"].ravel().tolist()), set(report.ravel().tolist())))
+        report = np.array(missions.report)
+        contacts = set(report[:, :, CONTACT].ravel().tolist())
+        seen.append((set(there["uas.status"].ravel().tolist()), contacts))
+        returned |= bool(report[:, :, RETURNING].any())
+        scenarios.append(there["scenario"].tolist())
     return {
         "different": sorted(not_equal),
         "restarts": int(there["mission"].sum()),
@@ -57,4 +60,7 @@ def compare(scenario, asked, n_steps, **settings):
         "apart": bool((there["x"][0] != there["x"][1]).any()),
         "x": there["x"][1].tolist(),
         "acted": int(missions.acted.sum()),
+        "returned": returned,
+        "scenarios": scenarios,
+        "observation": there["observation"].shape[-1],
     }

@@ -2,16 +2,11 @@
 
 import numpy as np
 from beside_batches import N_LANES, SEED, briefs_of, compare, different
-from changing_missions import AGAIN, EVENTS, STEPS, mission
+from changing_missions import AGAIN, EVERYTHING, STEPS, mission
 
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.gpu.missions import CudaMissions
 
-# guidance, which brings UAS home, does not run there
-EVERY_KIND = tuple(
-    {**event, "then": "hover"} if event.get("then") == "return" else event for event in EVENTS
-)
-EVERYTHING = mission(*EVERY_KIND, relaunch=True, **AGAIN)
 ASKED = np.full((2, 3), 0.2)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # as pytest does
 
 import arrays_on_gpu
+import guided_on_gpu
 import own_actions_on_gpu
 import own_blocks_on_gpu
 import own_disturbances_on_gpu
@@ -82,6 +83,8 @@ if __name__ == "__main__":
         "blocks": own_blocks_on_gpu.compare_all(),
         "disturbances": own_disturbances_on_gpu.compare_all(),
         "scenes": scenes_on_gpu.compare_all(),
+        "guided": guided_on_gpu.compare_all(),
+        "drawn": guided_on_gpu.compare_drawn(),
         "arrays": arrays_on_gpu.look_at_all(),
     }
     print(json.dumps({"missions": flown, **own}))

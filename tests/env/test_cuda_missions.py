@@ -3,14 +3,15 @@ from typing import Any
 
 import numba
 import pytest
-from changing_missions import EVENTS, EVERYTHING, mission
+from changing_missions import EVENTS, EVERYTHING
 from own_actions_on_gpu import CHOICES
-from scenes_on_gpu import EVERY_KIND
+from practice_grounds import box
+from small_worlds import meadow
 
 from uas_coverage_env import ContactKind, uas_coverage_v0
 from uas_coverage_env.entities.state import SWAPPING
 from uas_coverage_env.env.gpu.refused import REFUSED
-from uas_coverage_env.scenario import GeneratedScenarios
+from uas_coverage_env.scenario import GeneratedScenarios, Obstacle
 from uas_coverage_env.scenario.events import EVENT_KINDS
 
 vector_env: Any = uas_coverage_v0.vector_env
@@ -31,6 +32,23 @@ def test_missions_on_a_simulated_gpu_are_bit_for_bit_those_of_a_batch(flown_on_g
     assert flown_on_gpu["limits_exceeded"] == [*[[]] * 4, ["tilt"], ["speed", "tilt"]]
 
 
+def test_what_goes_to_places_is_guided_on_a_simulated_gpu_as_in_a_batch(flown_on_gpu):
+    guided = flown_on_gpu["guided"]
+    for name, result in guided.items():
+        assert result["different"] == [], name
+        assert result["restarts"] >= 2
+    assert guided["with v1"]["observation"] != guided["places"]["observation"]
+    for name in ("called home", "sent home"):
+        assert guided[name]["returned"]
+
+
+def test_lanes_draw_their_missions_on_a_simulated_gpu_as_in_a_batch(flown_on_gpu):
+    result = flown_on_gpu["drawn"]
+    assert result["different"] == []
+    assert len({tuple(scenarios) for scenarios in result["scenarios"]}) > 1
+    assert {each for scenarios in result["scenarios"] for each in scenarios} == {0, 1, 2}
+
+
 def test_own_blocks_and_terms_run_on_a_simulated_gpu_as_in_a_batch(flown_on_gpu):
     assert flown_on_gpu["blocks"].keys() >= {"behind", "alone", "weighed", "local", "picture"}
     for result in flown_on_gpu["blocks"].values():
@@ -44,7 +62,7 @@ def test_scenes_change_on_a_simulated_gpu_as_in_a_batch(flown_on_gpu):
         assert result["different"] == []
         assert result["restarts"] == 2
     n_events = len(EVENTS)
-    assert len(EVERY_KIND) == len(EVENT_KINDS) == n_events
+    assert len(EVENT_KINDS) == n_events
     change = {e for e, event in enumerate(EVERYTHING.events) if event.changes_scene}
     assert change <= set(everything["changes"])
     assert max(everything["changes"]) >= n_events  # a waypoint is asked for again
@@ -95,15 +113,18 @@ def test_a_wrong_call_is_answered_in_one_line(flown_on_gpu):
     assert all(said[name] in line and "\n" not in line for name, line in refused.items())
 
 
-SENT_HOME = [mission(e | {"then": "return"}) for e in EVENTS if e["kind"] == "radio_lost"]
+SLAB = Obstacle(
+    name="slab",
+    safe_distance_m=2.0,
+    vertices_m=box((80.0, 120.0, -14.0), (120.0, 150.0, -10.0)),
+)
+OVERHUNG = meadow(obstacles=[SLAB])
 ASKED_FOR = {
-    "waypoint": ("village", {"action": "waypoint"}),
-    "return_mode": ("village", {"return_mode": True}),
+    "overhang": (OVERHUNG, {"action": "waypoint"}),
+    "return_mode": (["open_field", OVERHUNG], {"return_mode": True}),
     "safety_filter": ("village", {"safety_filter": True}),
-    "drawn: a family": ("generated-light", {}),
+    "drawn one by one: a family": ("generated-light", {}),
     "a generator": (GeneratedScenarios(), {}),
-    "a sequence": (["village", "village"], {}),
-    "sends UAS home": (SENT_HOME[0], {}),
     "autoreset_mode": ("village", {"autoreset_mode": "SameStep"}),
     "mask_in_observation": ("village", {"mask_in_observation": True, "action": CHOICES}),
     "images_apart": ("village", {"images_apart": True, "observation": "grid"}),

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
+from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.world.height import lowest_altitude
 from uas_coverage_env.world.overhangs import is_below_overhang
 from uas_coverage_env.world.places import may_be_at
@@ -19,11 +19,11 @@ from uas_coverage_env.world.routes import line_is_clear
 LEG_TO_TARGET, LEG_TO_PLACE, TARGET_IS_PLACE = range(3)
 """What `past_overhangs` returns."""
 
-_CELL_M = 2.0  # of the grid
+_CELL_M = 2.0  # of the grid, at scale 1
 _REACH = 20  # cells to each side: 40 m; both chosen by hand, `tests/autopilot/test_overhangs.py`
 _SIDE = 2 * _REACH + 1
-_N_CELLS = _SIDE**3
-_MOST_PLACES = 4 * _SIDE  # of a way that are kept
+N_CELLS = _SIDE**3
+MOST_PLACES = 4 * _SIDE  # of a way that are kept
 _NEIGHBOURS = np.array(
     [
         (n, e, d)
@@ -43,19 +43,21 @@ def _is_free(arena, i, x0, y0, z0, x, y, z):
     return may_be_at(arena, i, x, y, z, (x0, y0, z0))
 
 
-@allocating_kernel
-def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
+@kernel
+def way_out(arena, i, x0, y0, z0, x1, y1, places_m, cells):
     """The places along the way out from below the overhangs at a place.
 
     From (x0, y0, z0), which is not among them; of several ways the shortest to (x1, y1). Written
-    to `places_m` (P, 3) [m], in order.
+    to `places_m` (P, 3) [m], in order; `cells` (3, N_CELLS) is written on the way.
 
     Returns:
         How many places; 0 where the grid has no way.
     """
-    before = np.full(_N_CELLS, -1, np.int32)
-    queue = np.empty(_N_CELLS, np.int32)
-    depth = np.zeros(_N_CELLS, np.int32)
+    cell_m = arena.rules[0].length_scale * _CELL_M
+    before, queue, depth = cells[0], cells[1], cells[2]
+    for cell in range(N_CELLS):
+        before[cell] = -1
+        depth[cell] = 0
     start = (_REACH * _SIDE + _REACH) * _SIDE + _REACH
     before[start] = start
     queue[0] = start
@@ -65,14 +67,14 @@ def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
         cell = queue[head]
         head += 1
         # what is found later is farther: it cannot be on a shorter way
-        if depth[cell] * _CELL_M >= best_m:
+        if depth[cell] * cell_m >= best_m:
             break
         a, b, c = cell // (_SIDE * _SIDE), cell // _SIDE % _SIDE, cell % _SIDE
-        x = x0 + (a - _REACH) * _CELL_M
-        y = y0 + (b - _REACH) * _CELL_M
-        z = z0 + (c - _REACH) * _CELL_M
+        x = x0 + (a - _REACH) * cell_m
+        y = y0 + (b - _REACH) * cell_m
+        z = z0 + (c - _REACH) * cell_m
         if not is_below_overhang(arena, x, y, z):
-            whole_m = depth[cell] * _CELL_M + math.hypot(x1 - x, y1 - y)
+            whole_m = depth[cell] * cell_m + math.hypot(x1 - x, y1 - y)
             if whole_m < best_m:
                 best, best_m = cell, whole_m
             continue
@@ -83,9 +85,9 @@ def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
             following = (a1 * _SIDE + b1) * _SIDE + c1
             if before[following] >= 0:
                 continue
-            there_x = x0 + (a1 - _REACH) * _CELL_M
-            there_y = y0 + (b1 - _REACH) * _CELL_M
-            there_z = z0 + (c1 - _REACH) * _CELL_M
+            there_x = x0 + (a1 - _REACH) * cell_m
+            there_y = y0 + (b1 - _REACH) * cell_m
+            there_z = z0 + (c1 - _REACH) * cell_m
             if _is_free(arena, i, x0, y0, z0, there_x, there_y, there_z) and line_is_clear(
                 arena, x, y, z, there_x, there_y, there_z
             ):
@@ -99,26 +101,26 @@ def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
     cell = best
     for k in range(depth[best] - 1, -1, -1):
         if k < count:
-            places_m[k, 0] = x0 + (cell // (_SIDE * _SIDE) - _REACH) * _CELL_M
-            places_m[k, 1] = y0 + (cell // _SIDE % _SIDE - _REACH) * _CELL_M
-            places_m[k, 2] = z0 + (cell % _SIDE - _REACH) * _CELL_M
+            places_m[k, 0] = x0 + (cell // (_SIDE * _SIDE) - _REACH) * cell_m
+            places_m[k, 1] = y0 + (cell // _SIDE % _SIDE - _REACH) * cell_m
+            places_m[k, 2] = z0 + (cell % _SIDE - _REACH) * cell_m
         cell = before[cell]
     return count
 
 
-@allocating_kernel
-def past_overhangs(arena, i, x0, y0, z0, x1, y1, z1, place_m):
+@kernel
+def past_overhangs(arena, i, x0, y0, z0, x1, y1, z1, places_m, cells, place_m):
     """Where to fly first, where a place or a target lies below an overhang.
 
-    The UAS is at (x0, y0, z0), its target at (x1, y1, z1).
+    The UAS is at (x0, y0, z0), its target at (x1, y1, z1). `places_m` (MOST_PLACES, 3) and `cells`
+    (3, N_CELLS) are written on the way.
 
     Returns:
         LEG_TO_TARGET: go on as if there was none; LEG_TO_PLACE: straight to the place, nothing is
         in between; TARGET_IS_PLACE: the place is to be taken for the target.
     """
-    places_m = np.empty((_MOST_PLACES, 3))
     if is_below_overhang(arena, x0, y0, z0):
-        count = way_out(arena, i, x0, y0, z0, x1, y1, places_m)
+        count = way_out(arena, i, x0, y0, z0, x1, y1, places_m, cells)
         for k in range(count - 1, -1, -1):
             x, y, z = places_m[k, 0], places_m[k, 1], places_m[k, 2]
             if k == 0 or line_is_clear(arena, x0, y0, z0, x, y, z):
@@ -126,7 +128,7 @@ def past_overhangs(arena, i, x0, y0, z0, x1, y1, z1, place_m):
                 return LEG_TO_PLACE
         return LEG_TO_TARGET
     if is_below_overhang(arena, x1, y1, z1):
-        count = way_out(arena, i, x1, y1, z1, x0, y0, places_m)
+        count = way_out(arena, i, x1, y1, z1, x0, y0, places_m, cells)
         for k in range(count):
             x, y, z = places_m[k, 0], places_m[k, 1], places_m[k, 2]
             place_m[0], place_m[1], place_m[2] = x, y, z

@@ -13,11 +13,13 @@ from uas_coverage_env.autopilot.control import write_brake, write_command
 from uas_coverage_env.autopilot.exit_overhang import LEG_TO_TARGET, TARGET_IS_PLACE, past_overhangs
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.autopilot.low_altitude_return import low_way
+from uas_coverage_env.autopilot.room import new_room
 from uas_coverage_env.compiled.kernels import (
     allocating_kernel,
     inlined_kernel,
     kernel,
     rare_kernel,
+    stack_array,
 )
 from uas_coverage_env.entities.commands import GO_TO, HOME, VELOCITY, GoTo, Velocity, command_mode
 from uas_coverage_env.entities.outcome import OUTCOME_DTYPE
@@ -32,17 +34,17 @@ LEAD_S = 1.6
 """The inner loop follows a velocity with about this delay; guidance steers from ahead [s]."""
 
 CRUISE_ALTITUDE_M = 8.0
-"""On a longer way UAS do not sink below this altitude above the floor [m]."""
+"""On a longer way UAS do not sink below this altitude above the floor, at scale 1 [m]."""
 
 HEADROOM_M = 0.5
-"""Roofs are passed this much above the distance of routes [m]."""
+"""Roofs are passed this much above the distance of routes, at scale 1 [m]."""
 
 _GLIDE_SLOPE = 0.12  # metres down a metre of way, towards the altitude of the target [-]
-_GLIDE_ENDS_M = 15.0  # before the target [m]
+_GLIDE_ENDS_M = 15.0  # before the target, at scale 1 [m]
 
 _TIGHT_M = 3.0
 """A corner so near to what routes avoid of two obstacles lies in a gap that is seen through from
-there alone: UAS come to rest at it before they turn [m]."""
+there alone, at scale 1: UAS come to rest at it before they turn [m]."""
 
 _STOPPING_PER_S = 0.28
 """Speed over distance on the way to a stop [1/s]."""
@@ -54,7 +56,7 @@ _PASSING_SHARE, _PASSING_PER_S = 0.75, 0.8
 """Speed past a waypoint: of the highest [-], and over its radius [1/s], whichever is less."""
 
 _SLOWING_PER_S, _SLOWED_M = 0.2, 8.0
-"""By how much faster a metre before it [1/s], down to this distance from it [m]."""
+"""By how much faster a metre before it [1/s], down to this distance from it, at scale 1 [m]."""
 
 _HEIGHT_SHARE, _CLIMBING_MPS = 0.6, 0.5
 """Of its radius, how far above or below its centre a waypoint is covered for sure [-]; and what is
@@ -153,6 +155,7 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
     needed_m = -math.inf
     speed_mps = arena.uas[i].speed_mps
     ceiling_m = arena.rules[0].ceiling_m
+    headroom_m = arena.rules[0].length_scale * HEADROOM_M
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[S.X], x[S.Y], x1, y1)
@@ -161,10 +164,10 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
         roof_m = obstacle.roof_m
         if not passes_over(obstacle, over, ends, leg, max(altitude_m, altitude1_m)):
             continue
-        needed_m = max(needed_m, roof_m + HEADROOM_M)
+        needed_m = max(needed_m, roof_m + headroom_m)
         # where it can be passed right below the ceiling, no more height is waited for
-        if roof_m > ceiling_m > obstacle.top_m + HEADROOM_M:
-            roof_m = ceiling_m - HEADROOM_M
+        if roof_m > ceiling_m > obstacle.top_m + headroom_m:
+            roof_m = ceiling_m - headroom_m
         rise_m = roof_m - altitude_m
         if rise_m > 0.0:
             climbing_s = rise_m / arena.uas[i].climb_mps + LEAD_S
@@ -181,7 +184,7 @@ def _is_tight(arena, x, y):
         if obstacle.tall and not level_apart(obstacle, x, y, x, y):
             first, last = obstacle.first_side, obstacle.last_side
             away_m = signed_distance(arena.normals, arena.offsets_m, first, last, x, y, 0.0)
-            n_near += away_m < _TIGHT_M
+            n_near += away_m < arena.rules[0].length_scale * _TIGHT_M
     return n_near > 1
 
 
@@ -203,7 +206,7 @@ def _passing_speed(arena, i, x, target, distance_m, altitude1_m):
     uas = arena.uas[i]
     radius_m = arena.waypoints[target].radius_m
     passing_mps = min(_PASSING_SHARE * uas.speed_mps, _PASSING_PER_S * radius_m)
-    before_m = max(0.0, distance_m - _SLOWED_M)
+    before_m = max(0.0, distance_m - arena.rules[0].length_scale * _SLOWED_M)
     speed_mps = min(uas.speed_mps, passing_mps + _SLOWING_PER_S * before_m)
     missing_m = abs(altitude1_m + x[S.Z]) - _HEIGHT_SHARE * radius_m
     if missing_m > 0.0:
@@ -230,15 +233,15 @@ def _approach_speed(arena, i, x, target, stop, brakes_late, distance_m, leg, alt
 def _altitude(arena, i, x, altitude1_m, way_m, needed_m):
     """Altitude to hold [m]: descend along a glide slope, but stay over what has to be passed."""
     rules = arena.rules[0]
-    glide_m = altitude1_m + _GLIDE_SLOPE * max(0.0, way_m - _GLIDE_ENDS_M)
-    cruise_m = max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M)
+    glide_m = altitude1_m + _GLIDE_SLOPE * max(0.0, way_m - rules.length_scale * _GLIDE_ENDS_M)
+    cruise_m = max(-x[S.Z], rules.floor_m + rules.length_scale * CRUISE_ALTITUDE_M)
     altitude_m = max(altitude1_m, min(cruise_m, glide_m), needed_m)
     floor_m = lowest_altitude(arena, i, x[S.X], x[S.Y])
     return min(max(altitude_m, floor_m), max(rules.ceiling_m, altitude1_m))
 
 
-@allocating_kernel(forceinline=True)
-def _next_leg(arena, i, x, target, stop, belief):
+@inlined_kernel
+def _next_leg(arena, i, x, target, stop, belief, room):
     """What is flown next on the way to a target, and how it ends.
 
     Returns:
@@ -249,8 +252,10 @@ def _next_leg(arena, i, x, target, stop, belief):
     row, x1, y1, z1 = target_position(arena, i, target)
     end_x, end_y, way_m, leg = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
     if leg != CLEAR and arena.rules[0].overhangs:
-        place_m = np.empty(3)
-        first = past_overhangs(arena, i, x[S.X], x[S.Y], x[S.Z], x1, y1, z1, place_m)
+        place_m = stack_array(3)
+        first = past_overhangs(
+            arena, i, x[S.X], x[S.Y], x[S.Z], x1, y1, z1, room.places_m, room.cells, place_m
+        )
         if first != LEG_TO_TARGET:
             x1, y1, z1 = place_m[0], place_m[1], place_m[2]
             end_x, end_y, way_m, leg = x1, y1, 0.0, CLEAR
@@ -288,13 +293,14 @@ def _write_safe(
     arena, i, x, reference, north_mps, east_mps, altitude_m, leg, nonlinear, command, path_m, belief
 ):
     """Write the wish, a velocity and an altitude, or the first of `_TRIES` that leaves room."""
+    headroom_m = arena.rules[0].length_scale * HEADROOM_M
     for k in range(_TRIES.shape[0]):
         along, aside, height = _TRIES[k]
         wanted_m = altitude_m
         if height == _LEVEL:
             # what is in the way of a descent is not in the way of staying up
             wanted_m = max(altitude_m, -x[S.Z] - x[S.VZ])
-        elif height == _IN_PLACE and abs(altitude_m + x[S.Z]) <= HEADROOM_M:
+        elif height == _IN_PLACE and abs(altitude_m + x[S.Z]) <= headroom_m:
             continue
         elif height == _STRAIGHT_ON:
             if leg != CLEAR or not arena.rules[0].overhangs:
@@ -309,9 +315,9 @@ def _write_safe(
     write_brake(command)
 
 
-@allocating_kernel
+@kernel
 def guide(
-    arena, i, x, reference, target, stop, nonlinear, command, belief=None, climb_m=0.0
+    room, arena, i, x, reference, target, stop, nonlinear, command, belief=None, climb_m=0.0
 ):  # fmt: skip
     """Write the command that flies UAS i towards a target, clear of fence and fixed obstacles.
 
@@ -319,6 +325,7 @@ def guide(
     brake. On the way home in a wind that it hardly gets ahead against, a UAS flies low.
 
     Args:
+        room: `Room`; written.
         arena: The mission.
         i: Index of the UAS.
         x: (14,) its state.
@@ -330,14 +337,14 @@ def guide(
         belief: (N_BELIEF,) of its inner loop; None: in still air.
         climb_m: By how much to climb above where it is; 0: it flies at the height of the way [m].
     """
-    end_x, end_y, altitude1_m, way_m, leg, stop = _next_leg(arena, i, x, target, stop, belief)
+    end_x, end_y, altitude1_m, way_m, leg, stop = _next_leg(arena, i, x, target, stop, belief, room)
+    path_m = room.path_m
     lead_s = LEAD_S
     if not stop:
         left_m = math.hypot(end_x - x[S.X], end_y - x[S.Y])
         lead_s = min(LEAD_S, _LEAD_SHARE * left_m / (math.hypot(x[S.VX], x[S.VY]) + _NOWHERE_M))
     ahead_x = end_x - x[S.X] - lead_s * x[S.VX]
     ahead_y = end_y - x[S.Y] - lead_s * x[S.VY]
-    path_m = np.empty((arena.rules[0].lookahead_steps + 1, 3))
     brakes_late = _brakes_late(arena, i, belief, target, leg)
     if brakes_late:
         _brake(arena, i, x, reference, nonlinear, path_m, belief)
@@ -361,29 +368,36 @@ def guide(
     )  # fmt: skip
 
 
+@kernel
+def steer_of(arena, state, nonlinear, outcome, i, room):
+    """`steer` for one UAS; `Room` is written."""
+    if state.uas[i].status != FLYING:
+        return
+    command = outcome[i].applied_command
+    if state.uas[i].returning:
+        command.kind = GO_TO
+        command.values[0] = HOME
+        command.values[1] = 0.0
+        command.returning = True
+        outcome[i].returning = True
+    if command.kind == GO_TO:
+        target = int(command.values[0])
+        stop = comes_to_rest(arena, state, target)
+        guide(
+            room, arena, i, state.x[i], state.uas[i].reference_mps[:], target, stop, nonlinear,
+            command, state.uas[i].belief[:], command.values[1],
+        )  # fmt: skip
+
+
 @allocating_kernel
 def steer(arena, state, nonlinear, outcome):
     """Resolve commands that name a place into velocities; a UAS called home gets such a command.
 
     Of the outcome, applied_command and returning are written.
     """
+    room = new_room(arena)
     for i in range(state.uas.shape[0]):
-        if state.uas[i].status != FLYING:
-            continue
-        command = outcome[i].applied_command
-        if state.uas[i].returning:
-            command.kind = GO_TO
-            command.values[0] = HOME
-            command.values[1] = 0.0
-            command.returning = True
-            outcome[i].returning = True
-        if command.kind == GO_TO:
-            target = int(command.values[0])
-            stop = comes_to_rest(arena, state, target)
-            guide(
-                arena, i, state.x[i], state.uas[i].reference_mps[:], target, stop, nonlinear,
-                command, state.uas[i].belief[:], command.values[1],
-            )  # fmt: skip
+        steer_of(arena, state, nonlinear, outcome, i, room)
 
 
 def velocity_of(

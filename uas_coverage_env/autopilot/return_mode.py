@@ -18,9 +18,6 @@ RETURN_MODE = TravelTimeModel(speed_share=2.0 / 3.0, in_turn=True, landing_s=12.
 """On the way home a UAS turns, climbs, and is held up by others. Chosen by hand;
 `benchmarks/returns.py` shows what it costs. Recorded flights and trained policies depend on it."""
 
-_CLOCK_RESERVE_S = 30.0
-"""Left of the mission when a UAS has landed [s]."""
-
 _STEPS_LATER = 3.0
 """What a step takes from what is left of the way home, in steps: the step itself, a step farther
 away at full speed, and half a turn more."""
@@ -99,7 +96,7 @@ def _calls_home(arena, state, i, share, more_s):
     uas = arena.uas[i]
     home_s = share * seconds_home(arena, i, x) + more_s
     time_left_s = (rules.max_steps - state.step[0]) * rules.dt_s
-    if home_s + _CLOCK_RESERVE_S - RETURN_MODE.landing_s > time_left_s:
+    if home_s + rules.clock_reserve_s - RETURN_MODE.landing_s > time_left_s:
         return True
     if x[S.DOD] + home_s * uas.dod_per_s >= uas.dod_max:
         return True
@@ -124,6 +121,17 @@ def has_to_return(arena, state, i):
 
 
 @kernel
+def call_home_of(arena, state, i):
+    """`call_home` for one UAS."""
+    if state.uas[i].status != FLYING:
+        return
+    if not state.uas[i].returning:
+        state.uas[i].returning = has_to_return(arena, state, i)
+    elif arena.rules[0].disturbed:
+        state.uas[i].returning = _calls_home(arena, state, i, _AMPLE, _AMPLE_S)
+
+
+@kernel
 def call_home(arena, state, nonlinear, outcome):
     """Call those home that have to return; in still air they fly home from then on.
 
@@ -131,9 +139,4 @@ def call_home(arena, state, nonlinear, outcome):
     It goes back to work when that is over, if charge and time are ample.
     """
     for i in range(state.uas.shape[0]):
-        if state.uas[i].status != FLYING:
-            continue
-        if not state.uas[i].returning:
-            state.uas[i].returning = has_to_return(arena, state, i)
-        elif arena.rules[0].disturbed:
-            state.uas[i].returning = _calls_home(arena, state, i, _AMPLE, _AMPLE_S)
+        call_home_of(arena, state, i)

@@ -297,12 +297,17 @@ class Handover:
 
 
 def _numbers_of(value: Any) -> Iterator[int]:
-    """The words of an array as numba has it in memory, owned by nothing; or a number."""
-    if isinstance(value, np.ndarray):
-        yield from (0, 0, value.size, value.itemsize, value.ctypes.data)
-        yield from (*value.shape, *value.strides)
-    elif isinstance(value, tuple):
+    """The words of an array as numba has it in memory, owned by nothing; or a number.
+
+    An array may lie on a GPU, and so may what is made of the words.
+    """
+    if isinstance(value, tuple):
         for each in value:
             yield from _numbers_of(each)
+    elif hasattr(value, "shape"):
+        there = getattr(value, "__cuda_array_interface__", None)
+        at = there["data"][0] if there else value.ctypes.data
+        yield from (0, 0, value.size, value.dtype.itemsize, at)
+        yield from (*value.shape, *value.strides)
     else:
         yield value

@@ -157,20 +157,25 @@ def fly(arena, state, nonlinear, code, outcome):
 
 
 @inlined_kernel
+def fly_still_of(arena, state, i, outcome):
+    """`fly_still` for one UAS."""
+    if state.uas[i].status != FLYING:
+        return
+    event = outcome[i]
+    if rarely(event.grounded):
+        _rest(arena, state, i, outcome)
+        return
+    _write_inputs(arena, as_estimated(state), i, outcome)
+    x = state.x[i]
+    voltage_V, current_A = lpv_step(arena.vehicles[i], x, event.u[:], x)
+    _note(arena, state, i, event, voltage_V, current_A)
+
+
+@inlined_kernel
 def fly_still(arena, state, outcome):
     """`fly` in still air by the linear model; arguments as there."""
-    estimated = as_estimated(state)
     for i in range(state.uas.shape[0]):
-        if state.uas[i].status != FLYING:
-            continue
-        event = outcome[i]
-        if rarely(event.grounded):
-            _rest(arena, state, i, outcome)
-            continue
-        _write_inputs(arena, estimated, i, outcome)
-        x = state.x[i]
-        voltage_V, current_A = lpv_step(arena.vehicles[i], x, event.u[:], x)
-        _note(arena, state, i, event, voltage_V, current_A)
+        fly_still_of(arena, state, i, outcome)
 
 
 @inlined_kernel

@@ -10,7 +10,7 @@ from uas_coverage_env.compiled.views import Layout, slice_view
 from uas_coverage_env.entities.commands import ACCELERATION, GO_TO, HOME, VELOCITY, WRENCH
 from uas_coverage_env.entities.outcome import NONE
 from uas_coverage_env.entities.state import FLYING, LOST, STATE, as_measured
-from uas_coverage_env.simulation.flight import fly
+from uas_coverage_env.simulation.flight import fly, fly_still_of
 from uas_coverage_env.simulation.points import (
     COMMAND,
     JUDGED,
@@ -57,42 +57,48 @@ def first_invalid(arena, state, commands):
 
 
 @inlined_kernel
-def begin_step(state, commands, outcome):
-    """An outcome in which nothing has happened yet, with the commands as they were given.
+def begin_step_of(state, commands, outcome, i):
+    """An outcome of a UAS in which nothing has happened yet, with its command as it was given.
 
     Field by field, which is an eighth of a step faster than a record at once; a test finds a field
     that is forgotten here. What acts on how UAS fly is reset by `flight.clear`.
     """
+    event = outcome[i]
+    event.flew = state.uas[i].status == FLYING
+    for k in range(3):
+        event.before_m[k] = state.x[i, X + k]
+    for k in range(N_INPUTS):
+        event.u[k] = 0.0
+    event.voltage_V = 0.0
+    event.current_A = 0.0
+    event.energy_Wh = 0.0
+    event.newly_covered = 0
+    event.newly_covered_weight = 0.0
+    event.contact = NONE
+    event.contact_with = -1
+    event.breaches = 0
+    event.too_low = False
+    event.limits_exceeded = 0
+    event.landed = False
+    event.obstacle_clearance_m = math.inf
+    event.separation_m = math.inf
+    event.fence_clearance_m = math.inf
+    event.filtered = False
+    event.grounded = False
+    given = commands[i]
+    event.returning = given.returning
+    applied = event.applied_command
+    applied.kind = given.kind
+    for k in range(4):
+        applied.values[k] = given.values[k]
+    applied.returning = given.returning
+
+
+@inlined_kernel
+def begin_step(state, commands, outcome):
+    """`begin_step_of` all UAS."""
     for i in range(commands.shape[0]):
-        event = outcome[i]
-        event.flew = state.uas[i].status == FLYING
-        for k in range(3):
-            event.before_m[k] = state.x[i, X + k]
-        for k in range(N_INPUTS):
-            event.u[k] = 0.0
-        event.voltage_V = 0.0
-        event.current_A = 0.0
-        event.energy_Wh = 0.0
-        event.newly_covered = 0
-        event.newly_covered_weight = 0.0
-        event.contact = NONE
-        event.contact_with = -1
-        event.breaches = 0
-        event.too_low = False
-        event.limits_exceeded = 0
-        event.landed = False
-        event.obstacle_clearance_m = math.inf
-        event.separation_m = math.inf
-        event.fence_clearance_m = math.inf
-        event.filtered = False
-        event.grounded = False
-        given = commands[i]
-        event.returning = given.returning
-        applied = event.applied_command
-        applied.kind = given.kind
-        for k in range(4):
-            applied.values[k] = given.values[k]
-        applied.returning = given.returning
+        begin_step_of(state, commands, outcome, i)
 
 
 @inlined_kernel
@@ -117,8 +123,21 @@ def judge_contacts(arena, state, nonlinear, outcome):
     state.step[0] += 1
 
 
+class OfUas(NamedTuple):
+    """A stage of a step for one UAS, whatever the others do in it.
+
+    The processor flies all through it in turn, a GPU has a thread for each.
+    """
+
+    kernel: Any
+    """Takes what the stage of all takes, and then the index of the UAS."""
+
+
 class WorldStages(NamedTuple):
-    """What `advance` does before and after it looks for contacts with obstacles, as there."""
+    """What `advance` does before and after it looks for contacts with obstacles, as there.
+
+    The first two may be `OfUas`.
+    """
 
     prepare: Any
     """`prepare(arena, state, commands, nonlinear, assistants, code, outcome)`: what is flown."""
@@ -128,13 +147,20 @@ class WorldStages(NamedTuple):
     """`judge(arena, state, nonlinear, code, outcome)`."""
 
 
+@inlined_kernel
+def _assist_all(assistants, arena, measured, nonlinear, outcome):
+    for k in range(len(assistants)):
+        assist(assistants[k], arena, measured, nonlinear, outcome)
+
+
 @cache
-def stages_with(call_features: Any, fly: Any) -> WorldStages:
+def stages_with(call_features: Any, fly: Any, assist_all: Any = _assist_all) -> WorldStages:
     """The stages of a step of the world, made of these functions.
 
     Args:
         call_features: See `points.call_features`.
         fly: See `flight.fly`.
+        assist_all: Calls the assistants.
     """
 
     @inlined_kernel
@@ -142,9 +168,7 @@ def stages_with(call_features: Any, fly: Any) -> WorldStages:
         begin_step(state, commands, outcome)
         call_features(COMMAND, arena, state, code, outcome)
         if assistants is not None:
-            measured = as_measured(state)
-            for k in range(len(assistants)):
-                assist(assistants[k], arena, measured, nonlinear, outcome)
+            assist_all(assistants, arena, as_measured(state), nonlinear, outcome)
 
     @inlined_kernel
     def move(arena, state, nonlinear, code, outcome):
@@ -158,6 +182,30 @@ def stages_with(call_features: Any, fly: Any) -> WorldStages:
         call_features(SENSED, arena, state, code, outcome)
 
     return WorldStages(prepare, move, judge)
+
+
+@inlined_kernel
+def _move_still(arena, state, nonlinear, code, outcome, i):
+    fly_still_of(arena, state, i, outcome)
+
+
+@cache
+def plain_stages_with(call_features: Any, assist_one: Any) -> WorldStages:
+    """`stages_with`, where nothing acts on how UAS fly: in still air, by the linear model.
+
+    Args:
+        call_features: See `points.call_features`.
+        assist_one: Assists a UAS.
+    """
+
+    @inlined_kernel
+    def prepare(arena, state, commands, nonlinear, assistants, code, outcome, i):
+        begin_step_of(state, commands, outcome, i)
+        if assistants is not None:
+            assist_one(assistants, arena, as_measured(state), nonlinear, outcome, i)
+
+    judge = stages_with(call_features, fly).judge
+    return WorldStages(OfUas(prepare), OfUas(_move_still), judge)
 
 
 STAGES = stages_with(call_features, fly)

@@ -187,52 +187,58 @@ def _record_contact(event, contact, index):
 
 
 @inlined_kernel
-def check_obstacles(arena, state, outcome):
-    """Clearances from fixed and moving obstacles over the step, and contacts with them."""
+def check_obstacles_of(arena, state, i, outcome):
+    """Clearances of a UAS from fixed and moving obstacles over the step, and contacts with them."""
+    if state.uas[i].status != FLYING:
+        return
     step = min(state.step[0], arena.moving_path_m.shape[0] - 2)
     now_m = arena.moving_path_m[step]
     next_m = arena.moving_path_m[step + 1]
     rules = arena.rules[0]
-    for i in range(state.uas.shape[0]):
-        event = outcome[i]
-        if state.uas[i].status != FLYING:
+    event = outcome[i]
+    x0 = event.before_m[0]
+    y0 = event.before_m[1]
+    z0 = event.before_m[2]
+    x1 = state.x[i, X]
+    y1 = state.x[i, Y]
+    z1 = state.x[i, Z]
+    smallest, nearest = obstacle_clearance(arena, x0, y0, z0, x1, y1, z1)
+    radius_m = arena.uas[i].radius_m
+    if smallest < radius_m:
+        if arena.obstacles[nearest].no_fly_zone:
+            near_m, nearest = _solid_clearance(arena, x0, y0, z0, x1, y1, z1)
+        else:
+            near_m = smallest
+        if near_m < radius_m:
+            _record_contact(event, OBSTACLE, nearest)
+    for m in range(arena.moving.shape[0]):
+        moving = arena.moving[m]
+        gap_m = cylinder_gap(
+            moving.radius_m,
+            moving.half_height_m,
+            x0 - now_m[m, 0],
+            y0 - now_m[m, 1],
+            z0 - now_m[m, 2],
+            x1 - next_m[m, 0],
+            y1 - next_m[m, 1],
+            z1 - next_m[m, 2],
+        )
+        if gap_m > smallest or gap_m > rules.measured_m:
+            # farther than something else; no contact either, or there is one already
             continue
-        x0 = event.before_m[0]
-        y0 = event.before_m[1]
-        z0 = event.before_m[2]
-        x1 = state.x[i, X]
-        y1 = state.x[i, Y]
-        z1 = state.x[i, Z]
-        smallest, nearest = obstacle_clearance(arena, x0, y0, z0, x1, y1, z1)
-        radius_m = arena.uas[i].radius_m
-        if smallest < radius_m:
-            if arena.obstacles[nearest].no_fly_zone:
-                near_m, nearest = _solid_clearance(arena, x0, y0, z0, x1, y1, z1)
-            else:
-                near_m = smallest
-            if near_m < radius_m:
-                _record_contact(event, OBSTACLE, nearest)
-        for m in range(arena.moving.shape[0]):
-            moving = arena.moving[m]
-            gap_m = cylinder_gap(
-                moving.radius_m,
-                moving.half_height_m,
-                x0 - now_m[m, 0],
-                y0 - now_m[m, 1],
-                z0 - now_m[m, 2],
-                x1 - next_m[m, 0],
-                y1 - next_m[m, 1],
-                z1 - next_m[m, 2],
-            )
-            if gap_m > smallest or gap_m > rules.measured_m:
-                # farther than something else; no contact either, or there is one already
-                continue
-            clearance = moving_clearance(arena.moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1)
-            if clearance < radius_m:
-                _record_contact(event, MOVING_OBSTACLE, m)
-            if clearance < rules.measured_m:
-                smallest = min(smallest, clearance)
-        event.obstacle_clearance_m = smallest
+        clearance = moving_clearance(arena.moving, now_m, next_m, m, x0, y0, z0, x1, y1, z1)
+        if clearance < radius_m:
+            _record_contact(event, MOVING_OBSTACLE, m)
+        if clearance < rules.measured_m:
+            smallest = min(smallest, clearance)
+    event.obstacle_clearance_m = smallest
+
+
+@inlined_kernel
+def check_obstacles(arena, state, outcome):
+    """`check_obstacles_of` all UAS."""
+    for i in range(state.uas.shape[0]):
+        check_obstacles_of(arena, state, i, outcome)
 
 
 @inlined_kernel

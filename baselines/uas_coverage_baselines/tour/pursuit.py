@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.control import command_wrench, write_command
 from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target_position
 from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_kinematically
+from uas_coverage_env.autopilot.room import new_room
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import CLIMB, VELOCITY
 from uas_coverage_env.geometry.segments import signed_distance
@@ -211,7 +212,9 @@ def _pursue(arena, i, task, plan, k):
         speed_mps = min(speed_mps, math.sqrt(task.acceleration_mps2 * left_m), 0.5 * left_m)
         if target == HOME_TARGET:
             altitude_m += uas.descent_mps * max(way_m / uas.speed_mps - 1.0, 0.0)
-            altitude_m = min(altitude_m, max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M))
+            altitude_m = min(
+                altitude_m, max(-x[S.Z], rules.floor_m + rules.length_scale * CRUISE_ALTITUDE_M)
+            )
     if kind != CLEAR:
         needed_m, slow_mps = _roofs_ahead(arena, i, x, end_x, end_y)
         altitude_m = max(altitude_m, needed_m)
@@ -261,7 +264,7 @@ def push_to_guidance(arena, i, task, plan, command, belief=None):
         if done < len(task.route):
             target = task.route[done]
             stop = task.cover_m[done] < 0.0 or arena.waypoints[target].asks
-        guide(arena, i, x, plan.reference[k], target, stop, False, command, belief)
+        guide(new_room(arena), arena, i, x, plan.reference[k], target, stop, False, command, belief)
         altitude_m = command.values[2] if command.kind == VELOCITY else -x[S.Z]
         plan.push[k, 0] = command.values[0] - plan.commands[k, 0]
         plan.push[k, 1] = command.values[1] - plan.commands[k, 1]

@@ -174,7 +174,7 @@ class BlockParts(NamedTuple):
 @cache
 def block_parts_with(version: Version, width: int) -> BlockParts:
     """The parts of a version, compiled for observations of so many numbers."""
-    flight, looks = stages_with(version)
+    flight, looks = stages_with(version).whole
     keep_lane = keep_lane_with(width, fetches=True)
     finish_lane = finish_lane_with(begin_features, width)
 

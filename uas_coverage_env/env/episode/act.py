@@ -76,7 +76,7 @@ def is_own(acting: Acting) -> bool:
 def refuse_what_it_wrote(
     kind: ActionKind, asked: NDArray[np.float64], names: Sequence[str]
 ) -> None:
-    """Say for which UAS an own kind wrote a command that cannot be flown; see `write_commands`.
+    """Say for which UAS an own kind wrote a command that cannot be flown; see `write_command`.
 
     Args:
         kind: The kind.
@@ -164,32 +164,30 @@ def refuse_unflyable(arena, learners, acting, i, command):
 
 
 @cache
-def write_commands_with(own: Kinds) -> Any:
-    """A kernel that turns actions into commands, of which some kinds are part.
+def write_command_with(own: Kinds) -> Any:
+    """A kernel that turns the action of a UAS into a command, of which some kinds are part.
 
     Returns:
-        `write_commands(arena, state, tables, learners, scratch, acting)`: writes the commands and
-        the values of the actions, all of which are finite; targets are updated by the waypoint
-        action, and an action for which a kind of another origin wrote what cannot be flown becomes
-        NaN.
+        `write_command(arena, state, tables, learners, scratch, acting, i)`: writes the command and
+        the values of the action, which is finite; the target is updated by the waypoint action, and
+        an action for which a kind of another origin wrote what cannot be flown becomes NaN.
     """
     write = _written(own, 0)
 
     @inlined_kernel
-    def write_commands(arena, state, tables, learners, scratch, acting):
+    def write_command(arena, state, tables, learners, scratch, acting, i):
         which = acting.call[WHICH]
-        for i in range(scratch.commands.shape[0]):
-            begin_command(tables, learners, scratch, acting, i)
-            values = scratch.values[i]
-            command = scratch.commands[i]
-            if rarely(which == _OWN):
-                if state.uas[i].status == FLYING:
-                    _write_command(
-                        acting.call[ADDRESS], arena, state, tables, learners, i,
-                        acting.parameters, values, command,
-                    )  # fmt: skip
-                    refuse_unflyable(arena, learners, acting, i, command)
-            else:
-                write(arena, state, tables, learners, which, i, acting.parameters, values, command)
+        begin_command(tables, learners, scratch, acting, i)
+        values = scratch.values[i]
+        command = scratch.commands[i]
+        if rarely(which == _OWN):
+            if state.uas[i].status == FLYING:
+                _write_command(
+                    acting.call[ADDRESS], arena, state, tables, learners, i,
+                    acting.parameters, values, command,
+                )  # fmt: skip
+                refuse_unflyable(arena, learners, acting, i, command)
+        else:
+            write(arena, state, tables, learners, which, i, acting.parameters, values, command)
 
-    return write_commands
+    return write_command

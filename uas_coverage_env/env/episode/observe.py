@@ -98,8 +98,8 @@ def _written(blocks: Blocks, column: int, first: int) -> Any:
     return write_both
 
 
-LOOK = "arena, state, tables, learners, observing, looks, observation"
-"""The arguments of a look."""
+LOOK = "arena, state, tables, learners, observing, observation, i"
+"""The arguments of a look of a UAS."""
 
 _NUMBERS_OF_A_LOOK = 48
 
@@ -119,10 +119,8 @@ def blocks_of_looks(own: Blocks) -> list[Blocks]:
 
 
 @inlined_kernel
-def _choose(arena, state, tables, learners, observing, looks, observation):
-    for i in range(looks.shape[0]):
-        if looks[i]:
-            nearest_waypoints(arena, state, i, learners.candidates[i])
+def _choose(arena, state, tables, learners, observing, observation, i):
+    nearest_waypoints(arena, state, i, learners.candidates[i])
 
 
 def _look_of(needs: Sequence[Any], write: Any, calls: bool) -> Any:
@@ -130,30 +128,25 @@ def _look_of(needs: Sequence[Any], write: Any, calls: bool) -> Any:
     note, notes = noted(needs), bool(needs)
 
     @inlined_kernel
-    def look(arena, state, tables, learners, observing, looks, observation):
+    def look(arena, state, tables, learners, observing, observation, i):
         if not calls or observing.begins_as_version[0]:
-            for i in range(looks.shape[0]):
-                if looks[i]:
-                    if notes:
-                        note(arena, state, tables, learners, i)
-                    write(
-                        arena, state, tables, learners, observing.parameters, i, observation[i]
-                    )  # fmt: skip
+            if notes:
+                note(arena, state, tables, learners, i)
+            write(arena, state, tables, learners, observing.parameters, i, observation[i])
 
     return look
 
 
 @inlined_kernel
-def _call(arena, state, tables, learners, observing, looks, observation):
+def _call(arena, state, tables, learners, observing, observation, i):
     if rarely(observing.calls.shape[0] > 0):
-        for i in range(looks.shape[0]):
-            for b in range(observing.calls.shape[0] if looks[i] else 0):
-                call = observing.calls[b]
-                _write_block(
-                    call.address, arena, state, tables, learners, i,
-                    slice_view(observing.parameters, call.first, call.parameters),
-                    slice_view(observation[i], call.column, call.width),
-                )  # fmt: skip
+        for b in range(observing.calls.shape[0]):
+            call = observing.calls[b]
+            _write_block(
+                call.address, arena, state, tables, learners, i,
+                slice_view(observing.parameters, call.first, call.parameters),
+                slice_view(observation[i], call.column, call.width),
+            )  # fmt: skip
 
 
 @cache
@@ -168,9 +161,9 @@ def looks_with(own: Blocks, *, calls: bool = True) -> tuple[Any, ...]:
         calls: Whether others can be called at their address, which a GPU cannot.
 
     Returns:
-        Kernels of the arguments `LOOK`: for each UAS for which `looks` (U,) is set, a part of its
-        row of `observation` (U, V) float32 is written; the first one writes the waypoints that it
-        chooses among.
+        Kernels of the arguments `LOOK`, for UAS i, whatever the others do: each writes a part of
+        its row of `observation` (U, V) float32; the first one writes the waypoints that it chooses
+        among.
     """
     looks = [_choose]
     column = first = 0
@@ -187,6 +180,22 @@ def looks_with(own: Blocks, *, calls: bool = True) -> tuple[Any, ...]:
     return tuple(looks)
 
 
+LOOK_AROUND = "arena, state, tables, learners, observing, looks, observation"
+"""The arguments of a look of all UAS for which `looks` (U,) is set."""
+
+
+def look_around(look: Any) -> Any:
+    """A kernel of the arguments `LOOK_AROUND`: one of `looks_with` for all UAS."""
+
+    @inlined_kernel
+    def look_of_all(arena, state, tables, learners, observing, looks, observation):
+        for i in range(looks.shape[0]):
+            if looks[i]:
+                look(arena, state, tables, learners, observing, observation, i)
+
+    return look_of_all
+
+
 @cache
 def observe_with(own: Blocks) -> Any:
     """A kernel that observes, of which some blocks are part.
@@ -195,7 +204,7 @@ def observe_with(own: Blocks) -> Any:
         `observe(arena, state, tables, learners, observing, looks, observation)`: writes the rows of
         `observation` (U, V) of those UAS for which `looks` (U,) is set.
     """
-    look = in_turn(looks_with(own), LOOK)
+    look = in_turn([look_around(each) for each in looks_with(own)], LOOK_AROUND)
 
     @kernel
     def observe(arena, state, tables, learners, observing, looks, observation):

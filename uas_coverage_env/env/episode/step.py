@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 from uas_coverage_env.compiled.kernels import in_turn, inlined_kernel, kernel, rarely
 from uas_coverage_env.compiled.views import slice_view
 from uas_coverage_env.entities.state import FLYING, SWAPPING, as_observed
-from uas_coverage_env.env.episode.act import first_not_finite, write_commands_with
+from uas_coverage_env.env.episode.act import first_not_finite, write_command_with
 from uas_coverage_env.env.episode.memory import EPISODE, Acting, Observing, Paying
-from uas_coverage_env.env.episode.observe import LOOK, looks_with
+from uas_coverage_env.env.episode.observe import LOOK_AROUND, look_around, looks_with
 from uas_coverage_env.env.episode.pay import compute_rewards_with
 from uas_coverage_env.env.observation.nearest import NO_TARGET, write_around
 from uas_coverage_env.env.report import (
@@ -24,8 +24,8 @@ from uas_coverage_env.env.report import (
     STATUS,
 )
 from uas_coverage_env.env.versions import Version
-from uas_coverage_env.simulation.step import STAGES, WorldStages
-from uas_coverage_env.world.contacts import check_obstacles
+from uas_coverage_env.simulation.step import STAGES, OfUas, WorldStages
+from uas_coverage_env.world.contacts import check_obstacles_of
 
 ACCEPTED = -1
 
@@ -37,7 +37,7 @@ class Rules(NamedTuple):
     nonlinear: int
     """Whether the 6-DOF plant is flown, as a number."""
     assistants: Any
-    """Which help to fly, see `autopilot.assist`; None on a GPU."""
+    """Which help to fly, see `autopilot.assist`; on a GPU `Room` for guidance, or None."""
     code: Any
     """What features do, see `simulation.points.FeatureCode`; None on a GPU."""
     paying: Paying
@@ -94,24 +94,48 @@ class Stages(NamedTuple):
     """The stages of a step of a mission, in their order.
 
     A single mission flies through all of them; a batch lets many fly through one before the next
-    begins, with the same results.
+    begins, and a GPU all UAS at once through those that are `OfUas`, with the same results.
     """
 
     flight: tuple[Any, ...]
-    """Fly and pay: kernels of the arguments `STAGE`. All actions are finite; at the end
+    """Fly and pay: kernels of the arguments `STAGE`, or `OfUas`. All actions are finite; at the end
     `scratch.looks` says who looks around."""
     looks: tuple[Any, ...]
     """Observe, see `observe.looks_with`."""
 
+    @property
+    def whole(self) -> "Stages":
+        """The same for all UAS of a mission: of the arguments `STAGE` and `LOOK_AROUND`."""
+        flight = (of_all(each.kernel) if isinstance(each, OfUas) else each for each in self.flight)
+        return Stages(tuple(flight), tuple(map(look_around, self.looks)))
+
+
+@cache
+def of_all(kernel: Any) -> Any:
+    """A stage of one UAS for all of them in turn."""
+
+    @inlined_kernel
+    def stage(arena, state, tables, learners, scratch, rules):
+        for i in range(state.uas.shape[0]):
+            kernel(arena, state, tables, learners, scratch, rules, i)
+
+    return stage
+
+
+@inlined_kernel
+def meet(arena, state, tables, learners, scratch, rules, i):
+    """The stage in which a UAS meets obstacles, or does not."""
+    check_obstacles_of(arena, state, i, scratch.outcome)
+
 
 @cache
 def stages_of(
-    write_commands: Any, world: WorldStages, compute_rewards: Any, looks: tuple[Any, ...]
+    write_command: Any, world: WorldStages, compute_rewards: Any, looks: tuple[Any, ...]
 ) -> Stages:
     """The stages of a step, made of these functions.
 
     Args:
-        write_commands: See `act.write_commands_with`.
+        write_command: See `act.write_command_with`.
         world: See `simulation.step.stages_with`.
         compute_rewards: See `pay.compute_rewards_with`.
         looks: See `observe.looks_with`.
@@ -120,7 +144,9 @@ def stages_of(
 
     @inlined_kernel
     def act(arena, state, tables, learners, scratch, rules):
-        write_commands(arena, as_observed(state), tables, learners, scratch, rules.acting)
+        observed = as_observed(state)
+        for i in range(scratch.commands.shape[0]):
+            write_command(arena, observed, tables, learners, scratch, rules.acting, i)
         prepare(
             arena, state, scratch.commands, rules.nonlinear != 0, rules.assistants, rules.code,
             scratch.outcome,
@@ -131,21 +157,38 @@ def stages_of(
         move_world(arena, state, rules.nonlinear != 0, rules.code, scratch.outcome)
 
     @inlined_kernel
-    def meet(arena, state, tables, learners, scratch, rules):
-        check_obstacles(arena, state, scratch.outcome)
-
-    @inlined_kernel
     def judge(arena, state, tables, learners, scratch, rules):
         judge_world(arena, state, rules.nonlinear != 0, rules.code, scratch.outcome)
 
-    return Stages((act, move, meet, judge, _pay_with(compute_rewards)), looks)
+    first: tuple[Any, ...] = act, move
+    if isinstance(prepare, OfUas) and isinstance(move_world, OfUas):
+        first = _of_uas(write_command, prepare.kernel, move_world.kernel)
+    return Stages((*first, OfUas(meet), judge, _pay_with(compute_rewards)), looks)
+
+
+def _of_uas(write_command: Any, prepare: Any, move_world: Any) -> tuple[OfUas, OfUas]:
+    """The first two stages where each UAS flies whatever the others do."""
+
+    @inlined_kernel
+    def act(arena, state, tables, learners, scratch, rules, i):
+        write_command(arena, as_observed(state), tables, learners, scratch, rules.acting, i)
+        prepare(
+            arena, state, scratch.commands, rules.nonlinear != 0, rules.assistants, rules.code,
+            scratch.outcome, i,
+        )  # fmt: skip
+
+    @inlined_kernel
+    def move(arena, state, tables, learners, scratch, rules, i):
+        move_world(arena, state, rules.nonlinear != 0, rules.code, scratch.outcome, i)
+
+    return OfUas(act), OfUas(move)
 
 
 @cache
 def stages_with(version: Version) -> Stages:
     """`stages_of` what is in a version; other blocks, terms and kinds are called."""
     return stages_of(
-        write_commands_with(version.actions),
+        write_command_with(version.actions),
         STAGES,
         compute_rewards_with(version.reward),
         looks_with(version.observation),
@@ -167,8 +210,8 @@ def step_episode_with(version: Version) -> Any:
         arrays of `EPISODE` lie, then number and addresses of the assistants, then what features
         do: to hand over every array would take longer than the flight of a UAS.
     """
-    stages = stages_with(version)
-    fly, look = in_turn(stages.flight, STAGE), in_turn(stages.looks, LOOK)
+    stages = stages_with(version).whole
+    fly, look = in_turn(stages.flight, STAGE), in_turn(stages.looks, LOOK_AROUND)
 
     @kernel
     def step_episode(at, nonlinear, new_scene, before, observation):

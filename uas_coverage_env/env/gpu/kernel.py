@@ -1,38 +1,48 @@
-"""One step of many missions on a GPU: one thread flies one mission, by the code of a batch.
+"""One step of many missions on a GPU: the stages of a batch's step, by a thread a UAS or a mission.
 
 Numba compiles the same functions for a GPU that it compiles for the processor. It calls nothing at
-an address there, so all kernels of observation, reward, action and features are part of the step.
-What cannot run there is what makes arrays: guidance, return mode and safety filter.
+an address there, so all kernels of observation, reward, action and features are part of the step,
+and guidance and return mode where they are asked for. What cannot run there is what makes arrays:
+the safety filter, and the search for a way past overhangs.
+
+A step is a few launches, one after the other. What each UAS does whatever the others do (`OfUas`,
+and what it observes) has a thread for each UAS; the rest has one for each mission.
 """
 
+from collections.abc import Mapping
 from functools import cache
+from itertools import groupby
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numba import cuda
 from numpy.typing import NDArray
 
+from uas_coverage_env.autopilot.room import ROOM, Room
 from uas_coverage_env.compiled.kernels import in_turn, inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory
-from uas_coverage_env.compiled.views import rows_view
+from uas_coverage_env.compiled.views import Handover, lane_view, rows_view
 from uas_coverage_env.entities.state import FLYING, as_observed
 from uas_coverage_env.env.batch.kernel import scratch_of
 from uas_coverage_env.env.batch.lane import finish_lane_with, keep_lane_with
-from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP
-from uas_coverage_env.env.batch.pool import learners_of, tables_at
+from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP, MissionPool, Missions, new_missions
+from uas_coverage_env.env.batch.pool import ScenarioPool, learners_of, tables_at
 from uas_coverage_env.env.episode.act import begin_command, first_not_finite, refuse_unflyable
+from uas_coverage_env.env.episode.memory import ACTING, OBSERVING, PAYING, Acting, Observing, Paying
 from uas_coverage_env.env.episode.observe import LOOK, looks_with
 from uas_coverage_env.env.episode.pay import compute_rewards_with
-from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.env.episode.step import ACCEPTED, STAGE, Rules, Stages, stages_of
-from uas_coverage_env.features.feature import MissionFeature
+from uas_coverage_env.env.episode.step import ACCEPTED, STAGE, Rules, stages_of
 from uas_coverage_env.simulation.on_gpu import begin_features_of, stages_on_gpu
 from uas_coverage_env.simulation.pool import arena_of, state_of
+from uas_coverage_env.simulation.step import OfUas
+from uas_coverage_env.world.arena import ARENA
 
 
 class Marks(NamedTuple):
     """What is told of lanes beside what a batch tells."""
 
+    flies: Annotated[NDArray[np.bool_], "L"]
+    """It flies in this step."""
     ended: Annotated[NDArray[np.bool_], "L"]
     """The mission is over; the next step begins another and flies nothing."""
     refused: Annotated[NDArray[np.bool_], "L"]
@@ -44,6 +54,54 @@ class Marks(NamedTuple):
 
 
 MARKS = Memory(Marks)
+
+
+class Given(NamedTuple):
+    """What all launches of a step work on."""
+
+    pool: MissionPool
+    missions: Missions
+    marks: Marks
+    acting: Acting
+    paying: Paying
+    observing: Observing
+    rooms: Room
+    """Of guidance, with an axis of all UAS of all lanes in front; of none without it."""
+    observation: NDArray[np.float32]
+    """(L, U, V)."""
+
+
+def _example() -> Given:
+    pool = ScenarioPool("open_field")
+    none = dict.fromkeys((*ACTING.names, *PAYING.names, *OBSERVING.names), 0)
+    missions, marks = new_missions(pool.sizes, 1, 1), MARKS.zeros({"L": 1})
+    seen = np.zeros((1, 1, 1), np.float32)
+    return Given(
+        pool.arrays, missions, marks, ACTING.zeros(none), PAYING.zeros(none),
+        OBSERVING.zeros(none), new_rooms(pool.sizes, 0), seen,
+    )  # fmt: skip
+
+
+def new_rooms(sizes: Mapping[str, int], n: int) -> Room:
+    """For n UAS, whose missions have no overhangs."""
+    return ROOM.zeros({**sizes, "places": 0, "cells": 0}, lanes=n)
+
+
+_room_of = lane_view(ROOM, sized_by=ARENA)
+
+GIVEN = Handover(_example)
+"""How kernels are given it: numba takes a millisecond to hand over a hundred arrays."""
+
+_take = GIVEN.take
+
+
+class Launch(NamedTuple):
+    """A part of a step."""
+
+    kernel: Any
+    """To be launched with what `GIVEN` says of `Given`."""
+    of_uas: bool
+    """It takes a thread for each UAS of each mission; else one for each mission."""
 
 
 @kernel
@@ -58,45 +116,19 @@ def _is_due(state):
 
 
 @cache
-def _write_commands_with(write: Any, own: bool) -> Any:
-    """`act.write_commands_with` of one kernel, of a kind of the version or of one's own."""
+def _write_command_with(write: Any, own: bool) -> Any:
+    """`act.write_command_with` of one kernel, of a kind of the version or of one's own."""
 
     @inlined_kernel
-    def write_commands(arena, state, tables, learners, scratch, acting):
-        for i in range(scratch.commands.shape[0]):
-            begin_command(tables, learners, scratch, acting, i)
-            if not own or state.uas[i].status == FLYING:
-                command, values = scratch.commands[i], scratch.values[i]
-                write(arena, state, tables, learners, i, acting.parameters, values, command)
-                if own:
-                    refuse_unflyable(arena, learners, acting, i, command)
+    def write_command(arena, state, tables, learners, scratch, acting, i):
+        begin_command(tables, learners, scratch, acting, i)
+        if not own or state.uas[i].status == FLYING:
+            command, values = scratch.commands[i], scratch.values[i]
+            write(arena, state, tables, learners, i, acting.parameters, values, command)
+            if own:
+                refuse_unflyable(arena, learners, acting, i, command)
 
-    return write_commands
-
-
-@cache
-def _fly_lane_with(stages: Stages, begin_features: Any, width: int) -> Any:
-    """What one lane does in a step; a thread has no others to fly with it."""
-    fly, look = in_turn(stages.flight, STAGE), in_turn(stages.looks, LOOK)
-    keep_lane = keep_lane_with(width, fetches=False)
-    finish_lane = finish_lane_with(begin_features, width)
-
-    @inlined_kernel
-    def fly_lane(pool, missions, rules, lane, order, observation):
-        if order == FLY:
-            keep_lane(pool, missions, lane, observation, observation)
-            s = missions.lanes.scene[lane]
-            arena, tables = arena_of(pool.arenas, s), tables_at(pool.tables, s)
-            state = state_of(missions.worlds, lane, pool.arenas, s)
-            learners = learners_of(missions.learners, lane, pool.arenas, s)
-            scratch = scratch_of(missions.scratch, lane, pool.arenas, s)
-            fly(arena, state, tables, learners, scratch, rules)
-            rows = rows_view(observation, lane, (arena.uas.shape[0], width))
-            seen = as_observed(state)
-            look(arena, seen, tables, learners, rules.observing, scratch.looks, rows)
-        finish_lane(pool, missions, rules, lane, order, NEXT_STEP, observation, observation)
-
-    return fly_lane
+    return write_command
 
 
 @cache
@@ -115,66 +147,168 @@ def _is_refused_with(choices: int) -> Any:
     return is_refused
 
 
-def step_with(
-    settings: MissionSettings, features: tuple[MissionFeature, ...], otherwise: bool, changes: bool
-) -> Any:
-    """The step of all lanes, to be launched.
+PART = "given, lane, i"
+"""The arguments of a part of a step: `Given`, the mission, and the UAS of a part of UAS."""
+
+
+@cache
+def _begin_with(choices: int, width: int) -> Any:
+    """The part of a mission before it flies."""
+    is_refused, keep_lane = _is_refused_with(choices), keep_lane_with(width, fetches=False)
+
+    @inlined_kernel
+    def begin(given, lane, i):
+        pool, missions, marks = given.pool, given.missions, given.marks
+        flies = missions.lanes.orders[lane] == FLY
+        s = missions.lanes.scene[lane]
+        asked = learners_of(missions.learners, lane, pool.arenas, s).asked
+        marks.due[lane] = False
+        marks.refused[lane] = flies and is_refused(asked)
+        marks.flies[lane] = flies and not marks.refused[lane]
+        if marks.flies[lane]:
+            keep_lane(pool, missions, lane, given.observation, given.observation)
+
+    return begin
+
+
+@cache
+def _fly_with(stages: tuple[Any, ...], nonlinear: bool, guided: bool) -> Any:
+    """The part of a mission, or of a UAS, that flies through stages one after the other."""
+    of_uas = isinstance(stages[0], OfUas)
+    kernels = [stage.kernel for stage in stages] if of_uas else stages
+    run = in_turn(kernels, f"{STAGE}, i" if of_uas else STAGE)
+
+    @inlined_kernel
+    def fly(given, lane, i):
+        if not given.marks.flies[lane]:
+            return
+        pool, missions = given.pool, given.missions
+        s = missions.lanes.scene[lane]
+        arena, tables = arena_of(pool.arenas, s), tables_at(pool.tables, s)
+        state = state_of(missions.worlds, lane, pool.arenas, s)
+        learners = learners_of(missions.learners, lane, pool.arenas, s)
+        scratch = scratch_of(missions.scratch, lane, pool.arenas, s)
+        room = None
+        if guided:
+            k = lane * given.observation.shape[1] + i
+            room = _room_of(given.rooms, k, pool.arenas, s)
+        rules = Rules(given.acting, nonlinear, room, None, given.paying, given.observing)
+        if not of_uas:
+            run(arena, state, tables, learners, scratch, rules)
+        elif i < state.uas.shape[0]:
+            run(arena, state, tables, learners, scratch, rules, i)
+
+    return fly
+
+
+@cache
+def _finish_with(begin_features: Any, width: int, changes: bool) -> Any:
+    """The part of a mission that has flown, or begins."""
+    finish_lane = finish_lane_with(begin_features, width)
+
+    @inlined_kernel
+    def finish(given, lane, i):
+        pool, missions, marks = given.pool, given.missions, given.marks
+        lanes, observation = missions.lanes, given.observation
+        if marks.refused[lane]:
+            return
+        s = lanes.scene[lane]
+        rules = Rules(given.acting, 0, None, None, given.paying, given.observing)
+        finish_lane(
+            pool, missions, rules, lane, lanes.orders[lane], NEXT_STEP, observation, observation
+        )
+        marks.ended[lane] = lanes.terminated[lane] or lanes.truncated[lane]
+        if marks.flies[lane]:
+            # as a kind of action does that wrote what cannot be flown
+            asked = learners_of(missions.learners, lane, pool.arenas, s).asked
+            marks.refused[lane] = first_not_finite(asked) != ACCEPTED
+            outcome = scratch_of(missions.scratch, lane, pool.arenas, s).outcome
+            for k in range(outcome.shape[0]):
+                marks.acted[lane] += outcome[k].flew
+            if changes:
+                marks.due[lane] = _is_due(state_of(missions.worlds, lane, pool.arenas, s))
+
+    return finish
+
+
+@cache
+def _look_with(looks: tuple[Any, ...], width: int) -> Any:
+    """The part of a UAS that looks around, after `finish`, which begins no mission that flew."""
+    run = in_turn(looks, LOOK)
+
+    @inlined_kernel
+    def look(given, lane, i):
+        pool, missions = given.pool, given.missions
+        s = missions.lanes.scene[lane]
+        n_uas = arena_of(pool.arenas, s).uas.shape[0]
+        if i < n_uas and given.marks.flies[lane] and missions.scratch.looks[lane, i]:
+            arena, tables = arena_of(pool.arenas, s), tables_at(pool.tables, s)
+            seen = as_observed(state_of(missions.worlds, lane, pool.arenas, s))
+            learners = learners_of(missions.learners, lane, pool.arenas, s)
+            rows = rows_view(given.observation, lane, (n_uas, width))
+            run(arena, seen, tables, learners, given.observing, rows, i)
+
+    return look
+
+
+def is_guided(pool: ScenarioPool) -> bool:
+    """Whether a step needs guidance."""
+    settings = pool.settings
+    return settings.kind.goes_to or settings.return_mode or pool.goes_home
+
+
+def step_with(pool: ScenarioPool) -> tuple[Launch, ...]:
+    """The step of all lanes, to be launched one part after the other.
+
+    Observations are written where those of the step before lie. All kernels of the settings are
+    part of the step.
 
     Args:
-        settings: How missions are flown and paid; all of its kernels are part of the step.
-        features: What the mission has of what few missions have.
-        otherwise: Whether others are flown than are believed.
-        changes: Whether the scene may change.
-
-    Returns:
-        `step(pool, missions, marks, acting, paying, observing, observation)`: as
-        `step_batch`, and observations are written where those of the step before lie.
+        pool: What is flown.
     """
+    settings, features = pool.settings, pool.features
     nonlinear, width = settings.dynamics == "nonlinear", settings.observation_size
     write = settings.kind.write
     own = all(write is not kind.write for kind in settings.version.actions)
     stages = stages_of(
-        _write_commands_with(write, own),
-        stages_on_gpu(features, nonlinear or otherwise),
+        _write_command_with(write, own),
+        stages_on_gpu(features, nonlinear or pool.sizes["true vehicles"] > 0, settings.return_mode),
         compute_rewards_with(settings.reward, calls=False),
         looks_with(settings.observation, calls=False),
     )
-    fly_lane = _fly_lane_with(stages, begin_features_of(features), width)
-    is_refused = _is_refused_with(settings.kind.choices)
-    return _launched(fly_lane, is_refused, nonlinear, changes)
+    parts = [(False, _begin_with(settings.kind.choices, width))]
+    for of_uas, group in groupby(stages.flight, _is_of_uas):
+        parts.append((of_uas, _fly_with(tuple(group), nonlinear, is_guided(pool))))
+    together = groupby(parts, lambda part: part[0])
+    launches = [_launch(of_uas, tuple(run for _, run in group)) for of_uas, group in together]
+    finish = _finish_with(begin_features_of(features), width, pool.changes)
+    # apart from one another they need fewer registers, so that more UAS look at once
+    looks = (stages.looks[:2], *((look,) for look in stages.looks[2:]))
+    apart = [_launch(True, (_look_with(each, width),)) for each in looks]
+    return (*launches, _launch(False, (finish,)), *apart)
 
 
-@cache  # to compile it again takes minutes
-def _launched(fly_lane: Any, is_refused: Any, nonlinear: bool, changes: bool) -> Any:
+def _is_of_uas(stage: Any) -> bool:
+    return isinstance(stage, OfUas)
+
+
+@cache  # to compile it again takes half a minute
+def _launch(of_uas: bool, parts: tuple[Any, ...]) -> Launch:
+    run = in_turn(parts, PART)
+
     @kernel
-    def step_lane(pool, missions, marks, acting, paying, observing, observation, lane):
-        lanes = missions.lanes
-        order = lanes.orders[lane]
-        scene = lanes.scene[lane]
-        asked = learners_of(missions.learners, lane, pool.arenas, scene).asked
-        marks.due[lane] = False
-        marks.refused[lane] = order == FLY and is_refused(asked)
-        if marks.refused[lane]:
-            return
-        rules = Rules(acting, nonlinear, None, None, paying, observing)
-        fly_lane(pool, missions, rules, lane, order, observation)
-        marks.ended[lane] = lanes.terminated[lane] or lanes.truncated[lane]
-        if order == FLY:
-            # as a kind of action does that wrote what cannot be flown
-            marks.refused[lane] = first_not_finite(asked) != ACCEPTED
-            outcome = scratch_of(missions.scratch, lane, pool.arenas, scene).outcome
-            for i in range(outcome.shape[0]):
-                marks.acted[lane] += outcome[i].flew
-            if changes:
-                marks.due[lane] = _is_due(state_of(missions.worlds, lane, pool.arenas, scene))
+    def part(numbers, thread):
+        given = _take(numbers)
+        n_lanes, n_uas = given.observation.shape[:2]
+        threads = n_uas if of_uas else 1
+        if thread < n_lanes * threads:
+            run(given, thread // threads, thread % threads)
 
     @cuda.jit
-    def step(pool, missions, marks, acting, paying, observing, observation):
-        lane = cuda.grid(1)  # pyrefly: ignore[missing-argument]
-        if lane < marks.ended.shape[0]:
-            step_lane(pool, missions, marks, acting, paying, observing, observation, lane)
+    def launch(numbers):
+        part(numbers, cuda.grid(1))  # pyrefly: ignore[missing-argument]
 
-    return step
+    return Launch(launch, of_uas)
 
 
 def _take_actions(given, asked):

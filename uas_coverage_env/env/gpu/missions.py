@@ -1,4 +1,4 @@
-"""Many missions of one scenario on a GPU: the batch's missions, in the memory of the GPU.
+"""Many missions on a GPU: the batch's missions, in the memory of the GPU.
 
 In double precision, as on the processor; the GPU's own roots and exponentials may differ in the
 last digit. Without a GPU, numba's simulator runs it: `NUMBA_ENABLE_CUDASIM=1`, for tests.
@@ -38,8 +38,17 @@ from uas_coverage_env.env.gpu.device import (
     write,
     write_lane,
 )
-from uas_coverage_env.env.gpu.kernel import MARKS, Marks, step_with, take_actions
-from uas_coverage_env.env.gpu.refused import Given, refuse
+from uas_coverage_env.env.gpu.kernel import (
+    GIVEN,
+    MARKS,
+    Given,
+    Marks,
+    is_guided,
+    new_rooms,
+    step_with,
+    take_actions,
+)
+from uas_coverage_env.env.gpu.refused import Asked, refuse
 from uas_coverage_env.env.observation.layout import observation_bounds
 from uas_coverage_env.env.versions import V0, Version
 from uas_coverage_env.scenario import Scenario
@@ -51,7 +60,7 @@ THREADS_PER_BLOCK: int = 64
 
 
 class CudaMissions:
-    """N missions of one scenario on the GPU; what flies in one is what a batch flies.
+    """N missions on the GPU; what flies in one is what a batch flies.
 
     A mission that has ended begins anew in the step after, whatever it is asked. Nothing leaves the
     GPU in a step, unless the scene of missions changes (events): the arrays below are those that
@@ -61,7 +70,8 @@ class CudaMissions:
 
     Args:
         num_envs: N.
-        scenario: Name of a shipped scenario, path of a scenario file, or a scenario.
+        scenario: Name of a shipped scenario, path of a scenario file, or a scenario; or a sequence
+            of these, from which each lane draws as a lane of a batch does.
         version: Of the environments.
         autoreset_mode: "NextStep".
         threads: 1.
@@ -86,6 +96,9 @@ class CudaMissions:
         acted: (N,) int64, agent-steps flown since the beginning.
         asked: (N, U · size) float64, the actions of the coming step; to be written in place.
         missions: All arrays of the batch, see `Missions`; to be read only.
+        settings: How missions are flown and paid.
+        launches: What a step launches, in turn.
+        numbers: What each of them is launched with.
 
     Raises:
         ValueError: An argument is none of what is allowed.
@@ -106,15 +119,20 @@ class CudaMissions:
     ) -> None:
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs is {num_envs!r}; give a whole number from 1 on")
-        told = MissionSettings.of(settings, version)
+        self.settings = told = MissionSettings.of(settings, version)
         flat_infos = settings.get("flat_infos")
         if isinstance(scenario, str | Path | Scenario) and scenario not in installed_families():
-            scenario = loaded_scenario(scenario)
-        refuse(Given(scenario, told, flat_infos, autoreset_mode, threads, render_mode))
-        check_gpu()
-        assert isinstance(scenario, Scenario)
+            scenario = [scenario]
+        if isinstance(scenario, Sequence) and not isinstance(scenario, str):
+            scenario = tuple(map(loaded_scenario, scenario))
+        asked = Asked(scenario, told, flat_infos, autoreset_mode, threads, render_mode)
+        refuse(asked)
+        assert isinstance(scenario, tuple)
         self.num_envs = num_envs
         self._pool = pool = ScenarioPool(scenario, told, lanes=num_envs)
+        self._asked = asked
+        self._refuse_overhangs()
+        check_gpu()
         self.n_uas = n_uas = pool.sizes["U"]
         low, high = (np.tile(bound, n_uas) for bound in observation_bounds(told.observation))
         self.single_observation_space = spaces.Box(low, high, dtype=np.float32)
@@ -136,11 +154,10 @@ class CudaMissions:
             on_device(paying_of(told.reward, told.weights, told.reward)),
             on_device(observing_of(told.observation, told.observation)),
         )
-        self._launched = step_with(
-            told, pool.features, pool.sizes["true vehicles"] > 0, pool.changes
-        )
+        self._rooms = on_device(new_rooms(pool.sizes, num_envs * n_uas if is_guided(pool) else 0))
+        self.launches = step_with(pool)
+        self.numbers: Any = self._handed_over()
         self._observing = observing_of(told.observation, version.observation)  # on the host
-        self._blocks = -(-num_envs // THREADS_PER_BLOCK), THREADS_PER_BLOCK
         self._begun = False
 
         lanes, learners = self.missions.lanes, self.missions.learners
@@ -203,7 +220,7 @@ class CudaMissions:
             given = as_device_array(actions)
             if given.shape != self.asked.shape:
                 raise ValueError(f"actions have shape {given.shape}; give {self.asked.shape}")
-            take_actions[self._blocks](given, self.asked)
+            take_actions[self._blocks(of_uas=False)](given, self.asked)
         elif actions is not None:
             here = np.zeros(self.missions.learners.asked.shape)
             accept_of_lanes(self._pool.actions, actions, here)
@@ -244,12 +261,28 @@ class CudaMissions:
         write(lanes.scene, scene)
         write(self.ended, state["terminated"] | state["truncated"])
         self._pool_there = on_device(pool.arrays)
+        self.numbers = self._handed_over()
         self._begun = bool((state["mission"] >= 0).all())
 
     def _launch(self) -> None:
-        self._launched[self._blocks](
-            self._pool_there, self.missions, self._marks, *self._parts, self._rows
+        for kernel, of_uas in self.launches:
+            kernel[self._blocks(of_uas)](self.numbers)
+
+    def _blocks(self, of_uas: bool) -> tuple[int, int]:
+        """How many blocks of how many threads are launched."""
+        n_threads = self.num_envs * (self.n_uas if of_uas else 1)
+        return -(-n_threads // THREADS_PER_BLOCK), THREADS_PER_BLOCK
+
+    def _handed_over(self) -> Any:
+        given = Given(
+            self._pool_there, self.missions, self._marks, *self._parts, self._rooms, self._rows
         )
+        return on_device(GIVEN.numbers_of(given))
+
+    def _refuse_overhangs(self) -> None:
+        """Refuse to guide UAS past what there is no room for."""
+        overhangs = self._pool.arrays.arenas.arrays.rules["overhangs"].any()
+        refuse(self._asked._replace(overhangs=is_guided(self._pool) and bool(overhangs)))
 
     def _change_scenes(self) -> None:
         """Lay out anew on the host, as a batch does, the scenes that change at this sample."""
@@ -272,8 +305,10 @@ class CudaMissions:
                 write_lane(there, lane, here)
                 changed.append(int(here.scene[0]))
         if changed:
+            self._refuse_overhangs()
             arenas, tables = pool.arrays.arenas, pool.arrays.tables
             self._pool_there = self._pool_there._replace(
                 arenas=with_missions(self._pool_there.arenas, ARENA, arenas, changed),
                 tables=with_missions(self._pool_there.tables, TABLES, tables, changed),
             )
+            self.numbers = self._handed_over()

@@ -6,22 +6,22 @@ from typing import Any, NamedTuple
 from gymnasium.vector import AutoresetMode
 
 from uas_coverage_env.env.episode.settings import MissionSettings
-from uas_coverage_env.scenario import Scenario
-from uas_coverage_env.world.events import goes_home
 
 _OWN_MODE = (AutoresetMode.NEXT_STEP, AutoresetMode.NEXT_STEP.value)
 
 
-class Given(NamedTuple):
+class Asked(NamedTuple):
     """What missions on a GPU are asked for."""
 
     scenario: Any
-    """A `Scenario`, or what draws them."""
+    """A tuple of scenarios, or what draws them."""
     settings: MissionSettings
     flat_infos: bool | None
     autoreset_mode: str | AutoresetMode
     threads: int
     render_mode: str | None
+    overhangs: bool = False
+    """Whether guidance would have to find a way past overhangs."""
 
 
 class Refusal(NamedTuple):
@@ -29,26 +29,21 @@ class Refusal(NamedTuple):
 
     what: str
     instead: str
-    is_asked_for: Callable[[Given], bool]
+    is_asked_for: Callable[[Asked], bool]
 
 
 REFUSED = (
-    Refusal(
-        '`action="waypoint"`, or another kind that goes to places',
-        "take an action that flies: velocity, acceleration, wrench, or a kind of your own",
-        lambda given: given.settings.kind.goes_to,
-    ),
-    Refusal("`return_mode`", "leave it out", lambda given: given.settings.return_mode),
     Refusal("`safety_filter`", "leave it out", lambda given: given.settings.safety_filter),
     Refusal(
-        "missions that are drawn: a family, a sequence, a generator",
-        "give one scenario, such as `generate_scenario(seed=1)`",
-        lambda given: not isinstance(given.scenario, Scenario),
+        "missions that are drawn one by one: a family, a generator",
+        "give a sequence of scenarios drawn beforehand, from which each mission is one",
+        lambda given: not isinstance(given.scenario, tuple),
     ),
     Refusal(
-        'an event that sends UAS home (`then = "return"`)',
-        'let them do another thing (`then = "hover"`)',
-        lambda given: goes_home(given.scenario),
+        '`action="waypoint"`, `return_mode`, or an event that sends UAS home, where obstacles '
+        "overhang",
+        "leave these out, or take a scenario whose obstacles stand on the ground",
+        lambda given: given.overhangs,
     ),
     Refusal(
         "`autoreset_mode` other than `NextStep`",
@@ -77,14 +72,14 @@ REFUSED = (
     ),
     Refusal(
         "`threads` other than 1",
-        "leave it out: every mission has a thread of the GPU",
+        "leave it out: every UAS has a thread of the GPU",
         lambda given: given.threads != 1,
     ),
 )
 """In the order in which they are looked for."""
 
 
-def refuse(given: Given) -> None:
+def refuse(given: Asked) -> None:
     """Refuse what does not run on a GPU.
 
     Raises:

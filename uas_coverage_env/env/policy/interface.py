@@ -16,7 +16,7 @@ from uas_coverage_env.env.episode.act import (
     acting_of,
     is_own,
     refuse_what_it_wrote,
-    write_commands_with,
+    write_command_with,
 )
 from uas_coverage_env.env.episode.arrays import arrays_of
 from uas_coverage_env.env.episode.memory import FIRST_OBSERVATION
@@ -32,11 +32,12 @@ from uas_coverage_env.world import Acceleration, Command, GoTo, SwarmState, Velo
 
 @cache
 def _commands_with(own: Kinds) -> Any:
-    write_commands = write_commands_with(own)
+    write_command = write_command_with(own)
 
     @kernel
     def commands(arena, state, tables, learners, scratch, acting):
-        write_commands(arena, state, tables, learners, scratch, acting)
+        for i in range(scratch.commands.shape[0]):
+            write_command(arena, state, tables, learners, scratch, acting, i)
 
     return commands
 

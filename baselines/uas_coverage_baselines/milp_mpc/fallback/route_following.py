@@ -23,16 +23,18 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.autopilot.control import command_wrench
 from uas_coverage_env.autopilot.guidance import guide
 from uas_coverage_env.autopilot.return_path import flight_home
+from uas_coverage_env.autopilot.room import new_room
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.approach import carefully, with_free_aims
 from uas_coverage_env.planning.backup.course import Course, braked
-from uas_coverage_env.planning.reserves import BRAKING_S, ROUTE_HOME_RESERVE
+from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
 from uas_coverage_env.vehicle import compile_vehicle, lpv_step
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
 from uas_coverage_env.vehicle.range import dod_per_s
+from uas_coverage_env.vehicle.scale import braking_s
 from uas_coverage_env.world import SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]
@@ -181,7 +183,7 @@ class RouteFollower:
         """The backup trajectories with that of one UAS replaced by its route."""
         dt_s = self._brief.dt_s
         pursued = max(round(pursued_s / dt_s), 1)
-        steps = pursued + int(np.ceil(BRAKING_S / dt_s))
+        steps = pursued + int(np.ceil(braking_s(self._brief.vehicles, dt_s) / dt_s))
         steps = steps if backup is None else max(steps, backup.u.shape[1])
         flown = []
         for row, name in enumerate(problem.names):
@@ -223,7 +225,7 @@ def _pursued(arena, i, start, target, pursued, steps, commands):
     states[0] = x
     for step in range(steps):
         if step < pursued:
-            guide(arena, i, x, reference, target, True, False, command)
+            guide(new_room(arena), arena, i, x, reference, target, True, False, command)
             command_wrench(vehicle, x, reference, command, inputs[step])
         else:
             velocity_climb_wrench(vehicle, x, reference, 0.0, 0.0, 0.0, inputs[step])
