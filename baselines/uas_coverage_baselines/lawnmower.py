@@ -138,20 +138,20 @@ class _Cuts:
         cruise_mps = min(vehicle.limits.v_cruise_mps for vehicle in brief.vehicles)
         speeds = speeds_of(brief.vehicles[0])._replace(level_mps=cruise_mps)
         route_m = np.array([brief.waypoints[waypoint].position_m for waypoint in order])
-        homes_m = np.array([uas.start_m for uas in brief.uas])
+        ends_m = np.array([(uas.start_m, uas.home_m) for uas in brief.uas])
         between_m = np.linalg.norm(np.diff(route_m, axis=0), axis=1)
         at_m = np.concatenate([[0.0], np.cumsum(between_m)])
         self._at_s = level_seconds(LAWNMOWER, speeds, at_m)
-        home_m = np.linalg.norm(route_m - homes_m[:, None], axis=2)
-        self._home_s = level_seconds(LAWNMOWER, speeds, home_m)
+        ways_m = np.linalg.norm(route_m - ends_m[:, :, None], axis=3)
+        self._out_s, self._home_s = np.moveaxis(level_seconds(LAWNMOWER, speeds, ways_m), 1, 0)
         self._order = list(order)
         # whoever starts nearer to the beginning of the order takes the earlier part
-        self._takers = self._home_s[:, 0].argsort(kind="stable")
+        self._takers = self._out_s[:, 0].argsort(kind="stable")
 
     @property
     def longest_s(self) -> float:
         """More than the time of any cut."""
-        return float(self._at_s[-1] + 2.0 * self._home_s.max() + 1.0)
+        return float(self._at_s[-1] + self._out_s.max() + self._home_s.max() + 1.0)
 
     def within(self, limits_s: NDArray[np.float64]) -> list[list[int]]:
         """Give each UAS in turn the longest run that its limit (U,) [s] allows."""
@@ -160,7 +160,7 @@ class _Cuts:
         for uas in self._takers:
             rest = slice(first, None)
             run_s = self._at_s[rest] - self._at_s[rest][:1]
-            run_s += self._home_s[uas, rest][:1] + self._home_s[uas, rest]
+            run_s += self._out_s[uas, rest][:1] + self._home_s[uas, rest]
             allowed = np.maximum.accumulate(run_s) <= limits_s[uas]
             runs[uas] = self._order[first : first + int(allowed.sum())]
             first += len(runs[uas])
@@ -175,7 +175,7 @@ def _allowed_times_s(brief: MissionBrief) -> NDArray[np.float64]:
     """(U,) [s] flight at full speed that the charge of each UAS allows."""
     return np.array(
         [
-            _USABLE * (uas.dod_max - (1.0 - uas.soc_0)) / dod_per_s(vehicle, uas.dod_max)
-            for uas, vehicle in zip(brief.uas, brief.vehicles, strict=True)
+            _USABLE * (dod - (1.0 - uas.soc_0)) / dod_per_s(vehicle, dod)
+            for uas, vehicle, dod in zip(brief.uas, brief.vehicles, brief.dod_landed, strict=True)
         ]
     )

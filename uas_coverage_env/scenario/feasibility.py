@@ -94,22 +94,54 @@ def _shared_among_all(scenario: UncheckedScenario, spare: float) -> RoughPlan:
     """The plan of UAS that can cover all waypoints."""
     waypoints = np.array([waypoint.position_m for waypoint in scenario.waypoints])
     starts = np.array([uas.start_m for uas in scenario.uas])
+    homes = np.array([uas.home_m for uas in scenario.uas])
     air_time_s = np.array(
         [
-            seconds_until(vehicle, 1.0 - uas.soc_0, uas.dod_max, _POWER * vehicle.power.hover_W)
-            for vehicle, uas in zip(scenario.vehicles, scenario.uas, strict=True)
+            seconds_until(vehicle, 1.0 - uas.soc_0, dod, _POWER * vehicle.power.hover_W)
+            for vehicle, uas, dod in zip(
+                scenario.vehicles, scenario.uas, scenario.dod_landed, strict=True
+            )
         ]
     )
     legs = _Legs(scenario)
     limits_s = air_time_s * (1.0 - spare)
-    outward = legs.between(starts[:, None], waypoints[None])
-    runs = [_Runs(legs, waypoints[order], outward.through(order)) for order in _orders(waypoints)]
+    ends = _Ends(
+        out_s=legs.between(starts[:, None], waypoints[None]).there_s,
+        home_s=legs.between(homes[:, None], waypoints[None]).back_s,
+        idle_s=np.where((starts == homes).all(axis=1), 0.0, legs.between(starts, homes).there_s),
+    )
+    runs = [_Runs(legs, waypoints[order], ends.through(order)) for order in _orders(waypoints)]
     plans = [flight_s for run in runs if (flight_s := run.balanced(limits_s)) is not None]
+    if (starts != homes).any():
+        along_s = _along_ways(legs, ends, waypoints, homes - starts)
+        plans += [along_s] if (along_s <= limits_s).all() else []
     complete = bool(plans)
     if not complete:
         endless = np.full(len(starts), math.inf)
         plans = [flight_s for run in runs if (flight_s := run.balanced(endless)) is not None]
     return RoughPlan(min(plans, key=lambda flight_s: flight_s.max()), air_time_s, complete)
+
+
+def _along_ways(
+    legs: _Legs, ends: _Ends, waypoints: NDArray[np.float64], ways_m: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(U,) flight times where each waypoint is visited on the way that it lengthens the least.
+
+    Args:
+        legs: Of the mission.
+        ends: From starts to the waypoints, and home.
+        waypoints: (W, 3) [m].
+        ways_m: (U, 3) from each start to the home.
+    """
+    taker = (ends.out_s + ends.home_s - ends.idle_s[:, None]).argmin(axis=0)
+    flight_s = np.where(ends.idle_s > 0.0, ends.idle_s + 2.0 * GENERATED.landing_s, 0.0)
+    for uas in np.unique(taker):
+        mine = np.flatnonzero(taker == uas)
+        mine = mine[np.argsort(waypoints[mine] @ ways_m[uas], kind="stable")]
+        between_s = legs.between(waypoints[mine[:-1]], waypoints[mine[1:]]).there_s
+        flight_s[uas] = ends.out_s[uas, mine[0]] + between_s.sum() + ends.home_s[uas, mine[-1]]
+        flight_s[uas] += 2.0 * GENERATED.landing_s
+    return flight_s
 
 
 class _Legs:
@@ -158,9 +190,18 @@ class _Times:
     there_s: NDArray[np.float64]
     back_s: NDArray[np.float64]
 
-    def through(self, order: NDArray[np.intp]) -> _Times:
-        """The same legs with their last axis in another order."""
-        return _Times(self.there_s[..., order], self.back_s[..., order])
+
+@dataclass(frozen=True)
+class _Ends:
+    """Flight times (U, W) from starts to waypoints and from there home, and (U,) without any."""
+
+    out_s: NDArray[np.float64]
+    home_s: NDArray[np.float64]
+    idle_s: NDArray[np.float64]
+
+    def through(self, order: NDArray[np.intp]) -> _Ends:
+        """The same with the waypoints in another order."""
+        return _Ends(self.out_s[:, order], self.home_s[:, order], self.idle_s)
 
 
 def _meets_box(start_m: NDArray, way: NDArray, low: NDArray, high: NDArray) -> NDArray:
@@ -193,11 +234,13 @@ def _orders(waypoints: NDArray[np.float64]) -> list[NDArray[np.intp]]:
 class _Runs:
     """An order of waypoints that is cut into one run per UAS."""
 
-    def __init__(self, legs: _Legs, route: NDArray[np.float64], outward: _Times) -> None:
+    def __init__(self, legs: _Legs, route: NDArray[np.float64], ends: _Ends) -> None:
         between_s = legs.between(route[:-1], route[1:]).there_s
         self.at_s = np.concatenate([[0.0], np.cumsum(between_s)])
-        self.out_s = outward.there_s + GENERATED.landing_s
-        self.home_s = outward.back_s + GENERATED.landing_s
+        self.out_s = ends.out_s + GENERATED.landing_s
+        self.home_s = ends.home_s + GENERATED.landing_s
+        # a UAS that lands elsewhere flies, whether it has a run or not
+        self.idle_s = np.where(ends.idle_s > 0.0, ends.idle_s + 2.0 * GENERATED.landing_s, 0.0)
 
     def balanced(self, limits_s: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """(U,) flight times with the smallest largest one; None where the limits allow none."""
@@ -216,7 +259,7 @@ class _Runs:
 
     def _greedy(self, limits_s: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Give each UAS the longest run that its limit allows."""
-        flight_s = np.zeros(len(limits_s))
+        flight_s = self.idle_s.copy()
         first = 0
         for uas, limit_s in enumerate(limits_s):
             if first == len(self.at_s):
@@ -228,4 +271,5 @@ class _Runs:
             if length:
                 flight_s[uas] = run_s[length - 1]
                 first += length
-        return flight_s if first == len(self.at_s) else None
+        complete = first == len(self.at_s) and (self.idle_s <= limits_s).all()
+        return flight_s if complete else None
