@@ -189,7 +189,7 @@ def test_a_reserve_beyond_what_a_uas_has_is_refused():
     with pytest.raises(ValueError, match=r"uas\[0\].soc_0: 1 is no more than the \[reserve\]"):
         one_way([WEST], [None], reserve={"minutes": 60.0})
     for both in ({"share": 0.2, "minutes": 1.0}, {}):
-        with pytest.raises(ValueError, match="share or minutes: .* give one of them"):
+        with pytest.raises(ValueError, match=r"share or minutes: .* give one of them"):
             one_way([WEST], [None], reserve=both or {"share": None})
 
 

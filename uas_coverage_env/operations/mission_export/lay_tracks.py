@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, covered_at
+from uas_coverage_env.flight.take_offs import TAKE_OFF_HEIGHT_M, Sortie, sorties_of
 from uas_coverage_env.operations.mission_export.leg_builder import SPENT_M, LegBuilder
 from uas_coverage_env.operations.mission_export.tracks import FloatArray, Leg, Tolerances, Track
 from uas_coverage_env.operations.path_geometry import distances_m
-from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M, Sortie, sorties_of
 from uas_coverage_env.world.coverage import covering_samples
 
 _GROUND_M = 0.3

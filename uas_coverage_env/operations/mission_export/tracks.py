@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.flight.take_offs import Sortie
 from uas_coverage_env.operations.clearance import Clearance
-from uas_coverage_env.operations.sorties import Sortie
 
 FloatArray = NDArray[np.float64]
 
