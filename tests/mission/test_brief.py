@@ -43,6 +43,7 @@ PUBLIC = {
     Scenario: {
         *("schema_version", "name", "dt_s", "max_steps", "landing_distance_m"),
         *("landing_speed_mps", "uas_safe_distance_m", "min_height_m", "from_ground"),
+        "route_margin_m",,
         *("geofence", "obstacles"),
         *("moving_obstacles", "uas", "waypoints", "decorations", "place", "execution"),
         "sorties",
