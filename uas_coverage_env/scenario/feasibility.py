@@ -105,15 +105,11 @@ def _shared_among_all(scenario: UncheckedScenario, spare: float) -> RoughPlan:
     )
     legs = _Legs(scenario)
     limits_s = air_time_s * (1.0 - spare)
-    ends = _Ends(
-        out_s=legs.between(starts[:, None], waypoints[None]).there_s,
-        home_s=legs.between(homes[:, None], waypoints[None]).back_s,
-        idle_s=np.where((starts == homes).all(axis=1), 0.0, legs.between(starts, homes).there_s),
-    )
+    ends = _Ends.of(legs, starts, homes, waypoints)
     runs = [_Runs(legs, waypoints[order], ends.through(order)) for order in _orders(waypoints)]
     plans = [flight_s for run in runs if (flight_s := run.balanced(limits_s)) is not None]
     if (starts != homes).any():
-        along_s = _along_ways(legs, ends, waypoints, homes - starts)
+        along_s = _along_ways(_Legs(scenario, around=True), starts, homes, waypoints)
         plans += [along_s] if (along_s <= limits_s).all() else []
     complete = bool(plans)
     if not complete:
@@ -123,21 +119,25 @@ def _shared_among_all(scenario: UncheckedScenario, spare: float) -> RoughPlan:
 
 
 def _along_ways(
-    legs: _Legs, ends: _Ends, waypoints: NDArray[np.float64], ways_m: NDArray[np.float64]
+    legs: _Legs,
+    starts: NDArray[np.float64],
+    homes: NDArray[np.float64],
+    waypoints: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """(U,) flight times where each waypoint is visited on the way that it lengthens the least.
 
     Args:
         legs: Of the mission.
-        ends: From starts to the waypoints, and home.
+        starts: (U, 3) [m].
+        homes: (U, 3) [m].
         waypoints: (W, 3) [m].
-        ways_m: (U, 3) from each start to the home.
     """
+    ends = _Ends.of(legs, starts, homes, waypoints)
     taker = (ends.out_s + ends.home_s - ends.idle_s[:, None]).argmin(axis=0)
     flight_s = np.where(ends.idle_s > 0.0, ends.idle_s + 2.0 * GENERATED.landing_s, 0.0)
     for uas in np.unique(taker):
         mine = np.flatnonzero(taker == uas)
-        mine = mine[np.argsort(waypoints[mine] @ ways_m[uas], kind="stable")]
+        mine = mine[np.argsort(waypoints[mine] @ (homes - starts)[uas], kind="stable")]
         between_s = legs.between(waypoints[mine[:-1]], waypoints[mine[1:]]).there_s
         flight_s[uas] = ends.out_s[uas, mine[0]] + between_s.sum() + ends.home_s[uas, mine[-1]]
         flight_s[uas] += 2.0 * GENERATED.landing_s
@@ -145,9 +145,16 @@ def _along_ways(
 
 
 class _Legs:
-    """Flight times between points: straight where that is free, else over the obstacles."""
+    """Flight times between points: straight where that is free, else over the obstacles.
 
-    def __init__(self, scenario: UncheckedScenario) -> None:
+    Args:
+        scenario: The mission.
+        around: Whether ways lead round what reaches up to the ceiling; otherwise over it, too.
+    """
+
+    def __init__(self, scenario: UncheckedScenario, *, around: bool = False) -> None:
+        ceiling_m = scenario.fence.vertices_m[:, 2].min() + scenario.geofence.margin_m
+        self.over_m = ceiling_m if around else -math.inf
         slowest = np.min([speeds_of(vehicle) for vehicle in scenario.vehicles], axis=0)
         self.speeds = SpeedLimits(*slowest.tolist())
         radius_m = max(uas.radius_m for uas in scenario.uas)
@@ -162,11 +169,15 @@ class _Legs:
         """Flight times from start_m (..., 3) to end_m (..., 3), broadcast together, and back."""
         way = end_m - start_m
         start_m = end_m - way
+        way_m = np.hypot(way[..., 0], way[..., 1])
         top_m = np.full(way.shape[:-1], -np.inf)
         for low, high in self.boxes:
             hit = _meets_box(start_m, way, low, high)
+            if low[2] < self.over_m:
+                way_m = np.where(hit, way_m + _round_m(start_m, end_m, low, high), way_m)
+                continue
             top_m = np.where(hit, np.maximum(top_m, -low[2]), top_m)
-        ground_s = level_seconds(GENERATED, self.speeds, np.hypot(way[..., 0], way[..., 1]))
+        ground_s = level_seconds(GENERATED, self.speeds, way_m)
         before_m, after_m = top_m + start_m[..., 2], top_m + end_m[..., 2]
         return _Times(
             there_s=np.maximum(
@@ -199,6 +210,16 @@ class _Ends:
     home_s: NDArray[np.float64]
     idle_s: NDArray[np.float64]
 
+    @classmethod
+    def of(cls, legs: _Legs, starts: NDArray, homes: NDArray, waypoints: NDArray) -> _Ends:
+        """Those between places (U, 3), (U, 3) and (W, 3) [m]."""
+        stays = (starts == homes).all(axis=1)
+        return cls(
+            out_s=legs.between(starts[:, None], waypoints[None]).there_s,
+            home_s=legs.between(homes[:, None], waypoints[None]).back_s,
+            idle_s=np.where(stays, 0.0, legs.between(starts, homes).there_s),
+        )
+
     def through(self, order: NDArray[np.intp]) -> _Ends:
         """The same with the waypoints in another order."""
         return _Ends(self.out_s[:, order], self.home_s[:, order], self.idle_s)
@@ -216,6 +237,22 @@ def _meets_box(start_m: NDArray, way: NDArray, low: NDArray, high: NDArray) -> N
         enters = np.maximum(enters, np.minimum(one, other))
         leaves = np.minimum(leaves, np.maximum(one, other))
     return np.less(enters, leaves)
+
+
+def _round_m(start_m: NDArray, end_m: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """(...) By how much the shortest way along one side of an upright box is longer, level [m]."""
+    corners = [np.array([n, e]) for n, e in ((low[0], low[1]), (low[0], high[1]),
+                                             (high[0], high[1]), (high[0], low[1]))]  # fmt: skip
+    start, end = start_m[..., :2], end_m[..., :2]
+    before, after = (
+        np.stack([np.linalg.norm(corner - place, axis=-1) for corner in corners])
+        for place in (start, end)
+    )
+    sides = [(a, b) for k in range(4) for a, b in ((k, (k + 1) % 4), ((k + 1) % 4, k))]
+    round_m = np.min(
+        [before[a] + np.linalg.norm(corners[b] - corners[a]) + after[b] for a, b in sides], axis=0
+    )
+    return round_m - np.linalg.norm(end - start, axis=-1)
 
 
 def _orders(waypoints: NDArray[np.float64]) -> list[NDArray[np.intp]]:
