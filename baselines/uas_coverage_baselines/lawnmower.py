@@ -12,6 +12,7 @@ from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.planning.following.following import first_of
 from uas_coverage_env.planning.reserves import LAWNMOWER
+from uas_coverage_env.scenario.feasibility import along_ways
 from uas_coverage_env.vehicle.range import dod_per_s, level_seconds, speeds_of
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
@@ -38,8 +39,16 @@ class Lawnmower:
         """Order the waypoints and cut the order into runs of about equal time."""
         self._targets = Targets(brief)
         self._can_cover = brief.can_cover
+        self._runs = self._runs_of(brief)
+        self.routes = None if brief.execution is None else self._runs
+
+    def _runs_of(self, brief: MissionBrief) -> list[list[int]]:
+        """The run of each UAS; where one lands elsewhere, what lies on the ways."""
         waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
-        self._runs: list[list[int]] = [[] for _ in brief.uas]
+        ends_m = np.array([(uas.start_m, uas.home_m) for uas in brief.uas])
+        if (ends_m[:, 0] != ends_m[:, 1]).any():
+            return along_ways(ends_m[:, 0], ends_m[:, 1], waypoints_m, brief.can_cover)
+        runs: list[list[int]] = [[] for _ in brief.uas]
         kinds = np.unique(brief.can_cover, axis=1)
         for able in kinds.T:
             # waypoints that the same UAS can cover, cut among these
@@ -48,8 +57,8 @@ class Lawnmower:
             team = np.flatnonzero(able).tolist()
             if team:
                 for u, run in zip(team, plan_runs(_brief_of(brief, team), order), strict=True):
-                    self._runs[u] += run
-        self.routes = None if brief.execution is None else self._runs
+                    runs[u] += run
+        return runs
 
     @property
     def given_up(self) -> dict[int, str]:
@@ -138,20 +147,20 @@ class _Cuts:
         cruise_mps = min(vehicle.limits.v_cruise_mps for vehicle in brief.vehicles)
         speeds = speeds_of(brief.vehicles[0])._replace(level_mps=cruise_mps)
         route_m = np.array([brief.waypoints[waypoint].position_m for waypoint in order])
-        ends_m = np.array([(uas.start_m, uas.home_m) for uas in brief.uas])
+        homes_m = np.array([uas.home_m for uas in brief.uas])
         between_m = np.linalg.norm(np.diff(route_m, axis=0), axis=1)
         at_m = np.concatenate([[0.0], np.cumsum(between_m)])
         self._at_s = level_seconds(LAWNMOWER, speeds, at_m)
-        ways_m = np.linalg.norm(route_m - ends_m[:, :, None], axis=3)
-        self._out_s, self._home_s = np.moveaxis(level_seconds(LAWNMOWER, speeds, ways_m), 1, 0)
+        home_m = np.linalg.norm(route_m - homes_m[:, None], axis=2)
+        self._home_s = level_seconds(LAWNMOWER, speeds, home_m)
         self._order = list(order)
         # whoever starts nearer to the beginning of the order takes the earlier part
-        self._takers = self._out_s[:, 0].argsort(kind="stable")
+        self._takers = self._home_s[:, 0].argsort(kind="stable")
 
     @property
     def longest_s(self) -> float:
         """More than the time of any cut."""
-        return float(self._at_s[-1] + self._out_s.max() + self._home_s.max() + 1.0)
+        return float(self._at_s[-1] + 2.0 * self._home_s.max() + 1.0)
 
     def within(self, limits_s: NDArray[np.float64]) -> list[list[int]]:
         """Give each UAS in turn the longest run that its limit (U,) [s] allows."""
@@ -160,7 +169,7 @@ class _Cuts:
         for uas in self._takers:
             rest = slice(first, None)
             run_s = self._at_s[rest] - self._at_s[rest][:1]
-            run_s += self._out_s[uas, rest][:1] + self._home_s[uas, rest]
+            run_s += self._home_s[uas, rest][:1] + self._home_s[uas, rest]
             allowed = np.maximum.accumulate(run_s) <= limits_s[uas]
             runs[uas] = self._order[first : first + int(allowed.sum())]
             first += len(runs[uas])

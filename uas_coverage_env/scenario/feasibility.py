@@ -109,7 +109,7 @@ def _shared_among_all(scenario: UncheckedScenario, spare: float) -> RoughPlan:
     runs = [_Runs(legs, waypoints[order], ends.through(order)) for order in _orders(waypoints)]
     plans = [flight_s for run in runs if (flight_s := run.balanced(limits_s)) is not None]
     if (starts != homes).any():
-        along_s = _along_ways(_Legs(scenario, around=True), starts, homes, waypoints)
+        along_s = _flown_along_ways(_Legs(scenario, around=True), starts, homes, waypoints)
         plans += [along_s] if (along_s <= limits_s).all() else []
     complete = bool(plans)
     if not complete:
@@ -118,29 +118,51 @@ def _shared_among_all(scenario: UncheckedScenario, spare: float) -> RoughPlan:
     return RoughPlan(min(plans, key=lambda flight_s: flight_s.max()), air_time_s, complete)
 
 
-def _along_ways(
+def along_ways(
+    starts_m: NDArray[np.float64],
+    homes_m: NDArray[np.float64],
+    waypoints_m: NDArray[np.float64],
+    can_cover: NDArray[np.bool_],
+) -> list[list[int]]:
+    """Each waypoint on the way, from start to home, that it lengthens the least, in that order.
+
+    Args:
+        starts_m: (U, 3) [m].
+        homes_m: (U, 3) [m].
+        waypoints_m: (W, 3) [m].
+        can_cover: (U, W) which UAS may cover which waypoint.
+
+    Returns:
+        Waypoints of each UAS; of none those that no UAS may cover.
+    """
+    there_m, back_m = (
+        np.linalg.norm(ends_m[:, None] - waypoints_m, axis=2) for ends_m in (starts_m, homes_m)
+    )
+    ways_m = homes_m - starts_m
+    longer_m = there_m + back_m - np.linalg.norm(ways_m, axis=1)[:, None]
+    taker = np.where(can_cover, longer_m, np.inf).argmin(axis=0)
+    runs = []
+    for uas, way_m in enumerate(ways_m):
+        mine = np.flatnonzero((taker == uas) & can_cover[uas])
+        runs.append(mine[np.argsort(waypoints_m[mine] @ way_m, kind="stable")].tolist())
+    return runs
+
+
+def _flown_along_ways(
     legs: _Legs,
     starts: NDArray[np.float64],
     homes: NDArray[np.float64],
     waypoints: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(U,) flight times where each waypoint is visited on the way that it lengthens the least.
-
-    Args:
-        legs: Of the mission.
-        starts: (U, 3) [m].
-        homes: (U, 3) [m].
-        waypoints: (W, 3) [m].
-    """
+    """(U,) flight times of `along_ways` of UAS that can cover all; places (N, 3) [m]."""
     ends = _Ends.of(legs, starts, homes, waypoints)
-    taker = (ends.out_s + ends.home_s - ends.idle_s[:, None]).argmin(axis=0)
     flight_s = np.where(ends.idle_s > 0.0, ends.idle_s + 2.0 * GENERATED.landing_s, 0.0)
-    for uas in np.unique(taker):
-        mine = np.flatnonzero(taker == uas)
-        mine = mine[np.argsort(waypoints[mine] @ (homes - starts)[uas], kind="stable")]
-        between_s = legs.between(waypoints[mine[:-1]], waypoints[mine[1:]]).there_s
-        flight_s[uas] = ends.out_s[uas, mine[0]] + between_s.sum() + ends.home_s[uas, mine[-1]]
-        flight_s[uas] += 2.0 * GENERATED.landing_s
+    everyone = np.ones(ends.out_s.shape, np.bool_)
+    for uas, run in enumerate(along_ways(starts, homes, waypoints, everyone)):
+        if run:
+            between_s = legs.between(waypoints[run[:-1]], waypoints[run[1:]]).there_s
+            flight_s[uas] = ends.out_s[uas, run[0]] + between_s.sum() + ends.home_s[uas, run[-1]]
+            flight_s[uas] += 2.0 * GENERATED.landing_s
     return flight_s
 
 
