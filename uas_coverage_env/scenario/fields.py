@@ -248,8 +248,8 @@ class Uas(StrictModel):
 
     Attributes:
         name: Unique; the agent's name in the environments.
-        vehicle: A shipped vehicle (`s500_v2`, `hexacopter`) or the path of a vehicle file,
-            relative to the scenario file; held as an absolute path.
+        vehicle: A shipped vehicle, such as `s500_v2`, or the path of a vehicle file, relative to
+            the scenario file; held as an absolute path.
         start_m: Where it takes off [m].
         land_m: Where it lands; without it, at its start [m].
         soc_0: State of charge at t = 0 [-].
