@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from uas_coverage_env import load_planner, load_scenario, load_vehicle, rollout
+from uas_coverage_env.compiled.kernels import interpreted
 from uas_coverage_env.flight.legs import legs_of
 from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.independent_check.judge import check
@@ -13,8 +14,10 @@ from uas_coverage_env.scenario import warnings
 from uas_coverage_env.scenario.families import BUILT_IN
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle.flight_time import endurance
-from uas_coverage_env.vehicle.layout import DOD, PHI, THETA, WZ
-from uas_coverage_env.world import Velocity, Wrench
+from uas_coverage_env.vehicle.layout import DOD
+from uas_coverage_env.vehicle.plant import mix
+from uas_coverage_env.vehicle.record import MAX_MOTORS
+from uas_coverage_env.world import Velocity
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +63,14 @@ def test_the_lpv_model_has_no_minimum_of_power_in_forward_flight():
     assert flown.cruise_nonlinear.power_W < 0.9 * flown.cruise_lpv.power_W
 
 
-def test_what_little_yaw_large_rotors_give_does_not_cost_the_tilt(city):
-    # a yaw rate whose damping alone would take more than all motors give
-    world = World(city, dynamics="nonlinear")
-    world.state.x[:, WZ] = 0.1
-    for torques in ((450.0, -550.0), (-900.0, 900.0)):
-        world.step({name: Wrench(0.0, *torques, 0.0) for name in world.active})
-    model = World(city)
-    for torques in ((450.0, -550.0), (-900.0, 900.0)):
-        model.step({name: Wrench(0.0, *torques, 0.0) for name in model.active})
-    off_rad = world.state.x[:, PHI : THETA + 1] - model.state.x[:, PHI : THETA + 1]
-    assert np.abs(off_rad).max() < 0.06
+@pytest.mark.parametrize("yaw_Nm", [0.0, 300.0, 6000.0, -6000.0])
+def test_what_little_yaw_large_rotors_give_does_not_cost_the_tilt(city, yaw_Nm):
+    (taxi, *_), motors_N = World(city).arena.vehicles, np.zeros(MAX_MOTORS)
+    torque = np.array([900.0, -900.0, yaw_Nm])
+    thrust_N = interpreted(mix)(taxi, 9_000.0, torque, motors_N)
+    assert thrust_N == pytest.approx(9_000.0)
+    assert torque[:2] == pytest.approx([900.0, -900.0])
+    assert abs(torque[2]) == pytest.approx(min(abs(yaw_Nm), 290.0), rel=0.05)
 
 
 def test_on_a_long_way_home_the_time_for_others_is_no_share_of_the_way(city):
