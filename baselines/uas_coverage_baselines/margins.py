@@ -15,21 +15,25 @@ def _derived(text: Any) -> Any:
 
 
 MarginM = Annotated[
-    Annotated[float, Field(ge=0.0, le=10.0)] | None,
-    BeforeValidator(_derived),
+    float | None,
     Field(
+        ge=0.0,
+        le=10.0,
         description="added to every clearance, for the path between samples [m]; none: "
-        f"{_MARGIN_M:g} m, and in proportion for vehicles that stop in less or more than 25 to 30 m"
+        f"{_MARGIN_M:g} m, in proportion for vehicles that stop in less or more than 25 to 30 m",
     ),
+    BeforeValidator(_derived),
 ]
 
 MovingMarginM = Annotated[
-    Annotated[float, Field(ge=0.0, le=50.0)] | None,
-    BeforeValidator(_derived),
+    float | None,
     Field(
+        ge=0.0,
+        le=50.0,
         description="added for a moving obstacle's next change of velocity [m]; none: "
-        f"{_MOVING_MARGIN_M:g} m, likewise"
+        f"{_MOVING_MARGIN_M:g} m, likewise",
     ),
+    BeforeValidator(_derived),
 ]
 
 
