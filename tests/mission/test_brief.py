@@ -46,13 +46,16 @@ PUBLIC = {
         "route_margin_m",
         *("geofence", "obstacles"),
         *("moving_obstacles", "uas", "waypoints", "decorations", "place", "execution"),
-        "sorties",
+        *("sorties", "reserve"),
     },
     MovingObstacle: {"name", "kind", "radius_m", "height_m", "safe_distance_m", "start_m"},
     # these are handed over as they are
     Geofence: {"margin_m", "vertices_m"},
     Obstacle: {"name", "kind", "safe_distance_m", "vertices_m"},
-    Uas: {"name", "vehicle", "start_m", "soc_0", "radius_m", "dod_max", "sensors", "heading"},
+    Uas: {
+        *("name", "vehicle", "start_m", "land_m", "soc_0", "radius_m", "dod_max"),
+        *("sensors", "heading"),
+    },
     Waypoint: {
         *("kind", "position_m", "radius_m", "weight"),
         *("sensor", "heights_m", "max_speed_mps", "again_after_s"),

@@ -248,11 +248,15 @@ def _lines(scenario: Scenario) -> list[str]:
         *(f"disturbed  {line}" for line in _disturbances(scenario)),
         *(f"tube       {line}" for line in _tubes(scenario)),
         *(
-            f"{uas.name:<9}  {uas.vehicle} at {_position(uas.start_m)} m, "
-            f"charge {uas.soc_0:.0%}, usable to {1 - uas.dod_max:.0%}{_carried(uas)}"
-            for uas in scenario.uas
+            f"{uas.name:<9}  {uas.vehicle} at {_position(uas.start_m)} m, {_lands(uas)}"
+            f"charge {uas.soc_0:.0%}, usable to {1 - dod:.0%}{_carried(uas)}"
+            for uas, dod in zip(scenario.uas, scenario.dod_landed, strict=True)
         ),
     ]
+
+
+def _lands(uas: Uas) -> str:
+    return f"lands at {_position(uas.home_m)} m, " if uas.land_m else ""
 
 
 def _carried(uas: Uas) -> str:

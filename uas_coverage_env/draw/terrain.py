@@ -55,7 +55,7 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
     edge = _flat(frame.pixels(np.vstack([fence, fence[:2]])))
     draw.line(edge, fill=colours.INK, width=round(1.5 * frame.unit), joint="curve")
     _scale_and_north(image, draw, frame, fence)
-    _pads(draw, frame, np.array([uas.start_m for uas in scenario.uas]))
+    _pads(draw, frame, np.array([(uas.start_m, uas.home_m) for uas in scenario.uas]).reshape(-1, 3))
     _margins(image, draw, frame, scenario.name)
     return image
 
@@ -159,8 +159,8 @@ def height_words(hull: ConvexPolytope) -> str:
     return f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
 
 
-def _pads(draw: "ImageDraw", frame: Frame, starts_m: NDArray[np.float64]) -> None:
-    for x, y in frame.pixels(starts_m).tolist():
+def _pads(draw: "ImageDraw", frame: Frame, pads_m: NDArray[np.float64]) -> None:
+    for x, y in np.unique(frame.pixels(pads_m), axis=0).tolist():
         marks.pad(draw, frame, x, y)
 
 

@@ -76,7 +76,7 @@ class Access:
         on the straight way home.
         """
         place_m = np.array(self._brief.waypoints[waypoint].position_m, float)
-        met = self._met(place_m, np.array(self._brief.uas[uas].start_m, float))
+        met = self._met(place_m, np.array(self._brief.uas[uas].home_m, float))
         for o in met[:_TRIED]:
             if self._opens(o, uas, waypoint):
                 return (self._obstacles[o].name,)
@@ -106,7 +106,7 @@ class Access:
 
     def _leads_home(self, arena: Arena, uas: int, places_m: FloatArray) -> BoolArray:
         """(W,) whether there is a way to waypoints at these places, or to their spheres."""
-        home_m = np.array(self._brief.uas[uas].start_m, float)
+        home_m = np.array(self._brief.uas[uas].home_m, float)
         row = len(self._brief.waypoints) + uas
         found = _are_open(arena, row, places_m, home_m)
         if found.all():

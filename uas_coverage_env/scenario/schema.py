@@ -26,10 +26,11 @@ from uas_coverage_env.scenario.fields import (
 )
 from uas_coverage_env.scenario.model import Scenario
 from uas_coverage_env.scenario.packs import Sorties
+from uas_coverage_env.scenario.reserve import LandingReserve
 
 _TABLES = (
     *(Geofence, Uas, Sensor, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
-    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing, Sorties, Execution),
+    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing, Sorties, LandingReserve, Execution),
     *EVENT_KINDS,
 )
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)

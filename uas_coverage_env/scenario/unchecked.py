@@ -33,6 +33,7 @@ from uas_coverage_env.scenario.fields import (
 )
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.payload import who_covers
+from uas_coverage_env.scenario.reserve import LandingReserve
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
 
 GLIDE = 2.0
@@ -81,6 +82,7 @@ class UncheckedScenario(_Tables):
     sensing: Sensing | None = None
     events: Events = ()
     sorties: Sorties | None = None
+    reserve: LandingReserve | None = None
     execution: Execution | None = None
 
     @model_serializer(mode="wrap")
@@ -129,7 +131,7 @@ class UncheckedScenario(_Tables):
 
     @property
     def landing_zone_m(self) -> float:
-        """Horizontal distance from its start within which a UAS may fly low [m]."""
+        """Horizontal distance from its start and home within which a UAS may fly low [m]."""
         return self.landing_distance_m + GLIDE * self.min_height_m
 
     def after(self, event: EventTable, time_s: float, uas: int = 0) -> Self:
@@ -176,6 +178,16 @@ class UncheckedScenario(_Tables):
     def can_cover(self) -> NDArray[np.bool_]:
         """(U, W) whether each UAS carries the sensor that each waypoint asks for."""
         return who_covers(self.uas, self.waypoints)
+
+    @cached_property
+    def dod_landed(self) -> tuple[float, ...]:
+        """Depth of discharge with which each UAS lands at the latest: `dod_max`, or less."""
+        if self.reserve is None:
+            return tuple(uas.dod_max for uas in self.uas)
+        return tuple(
+            self.reserve.dod(vehicle, uas.dod_max)
+            for uas, vehicle in zip(self.uas, self.vehicles, strict=True)
+        )
 
     @cached_property
     def vehicles(self) -> tuple[VehicleParams, ...]:

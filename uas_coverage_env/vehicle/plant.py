@@ -31,6 +31,7 @@ _RATE_GAIN_PER_S = 20.0
 # what the flight controller refuses to ask for, whatever the wrench says
 _TILT_ASKED_RAD = 1.0
 _RATE_ASKED_RADPS = 3.0
+_YAW_SHARE = 0.5
 # stops of the simulation, far from any flight of ours: Euler angles end at 90 degrees
 _TILT_STOP_RAD = 1.3
 _RATE_STOP_RADPS = 50.0
@@ -43,8 +44,9 @@ _ROLL, _PITCH, _YAW, _ROLL_RATE, _PITCH_RATE, _YAW_RATE = range(6)
 def mix(vehicle, thrust_N, torque, motor_thrust_N):
     """Thrust and torque (3,) as N_M motor thrusts, each within what a motor can give.
 
-    Motor thrusts are the pseudo-inverse of the rotor map, clipped. Returns the total thrust;
-    `torque` becomes what the motors give.
+    Motor thrusts are the pseudo-inverse of the rotor map, clipped. Yaw takes no motor's thrust by
+    more than half of its share, as of autopilots that tilt first: large rotors give little yaw
+    torque. Returns the total thrust; `torque` becomes what the motors give.
     """
     n = vehicle.n_motors
     strongest = vehicle.thrust_N_per_radps2 * vehicle.motor_speed_max_radps**2
@@ -52,6 +54,11 @@ def mix(vehicle, thrust_N, torque, motor_thrust_N):
     roll = 0.0
     pitch = 0.0
     yaw = 0.0
+    most_yaw = _YAW_SHARE * thrust_N / n
+    for i in range(n):
+        per_yaw = abs(vehicle.mixer[i, OF_YAW])
+        if n > 3 and per_yaw * abs(torque[2]) > most_yaw:
+            torque[2] = math.copysign(most_yaw / per_yaw, torque[2])
     for i in range(n):
         mixer = vehicle.mixer[i]
         share = mixer[OF_THRUST] * thrust_N + mixer[OF_ROLL] * torque[0]

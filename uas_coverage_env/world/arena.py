@@ -48,9 +48,13 @@ SAMPLES_AFTER_END = 64
 
 UAS_DTYPE = record_dtype(
     [
+        ("start_m", "f8", (3,)),
+        # where it lands
         ("home_m", "f8", (3,)),
         ("radius_m", "f8"),
+        # with which it lands at the latest, the reserve kept; and beyond which it is lost
         ("dod_max", "f8"),
+        ("dod_empty", "f8"),
         # what guidance and return mode assume of the vehicle
         ("speed_mps", "f8"),
         ("climb_mps", "f8"),
@@ -75,8 +79,8 @@ RULES_DTYPE = record_dtype(
         ("landing_speed_mps", "f8"),
         ("uas_safe_distance_m", "f8"),
         ("fence_margin_m", "f8"),
-        # above ground and roofs, 0 without such a rule; and how far from its start a UAS may be
-        # lower, horizontally
+        # above ground and roofs, 0 without such a rule; and how far from its start and home a UAS
+        # may be lower, horizontally
         ("min_height_m", "f8"),
         ("landing_zone_m", "f8"),
         # the largest safe distance of all obstacles
@@ -147,7 +151,7 @@ class Arena(NamedTuple):
     nodes_m: Annotated[NDArray[np.float64], "N", 2]
     """[m] corners at which routes turn."""
     node_distance_m: Annotated[NDArray[np.float64], "W + U", "N"]
-    """[m] way from a corner to a waypoint or a start; inf where there is none."""
+    """[m] way from a corner to a waypoint or a home; inf where there is none."""
     features: Annotated[NDArray[np.void], FEATURE_DTYPE, "features"]
     """As many in all missions of a pool."""
     feature_words: Annotated[NDArray[np.uint64], "feature words"]
@@ -270,12 +274,16 @@ def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64
 
 def _uas(scenario: Scenario) -> NDArray[np.void]:
     rows = []
-    for entry, vehicle in zip(scenario.uas, scenario.vehicles, strict=True):
+    for entry, vehicle, dod_landed in zip(
+        scenario.uas, scenario.vehicles, scenario.dod_landed, strict=True
+    ):
         limits = vehicle.limits
         rows.append(
             (
                 entry.start_m,
+                entry.home_m,
                 entry.radius_m,
+                dod_landed,
                 entry.dod_max,
                 limits.v_xy_max_mps,
                 limits.v_up_max_mps,

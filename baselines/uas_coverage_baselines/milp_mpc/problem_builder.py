@@ -53,7 +53,7 @@ class ProblemBuilder:
         self._view = WorldView(brief)
         self.dt_s = brief.dt_s
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
-        self.home_m = {uas.name: np.array(uas.start_m, float) for uas in brief.uas}
+        self.home_m = {uas.name: np.array(uas.home_m, float) for uas in brief.uas}
         self._vehicles = dict(zip((u.name for u in brief.uas), brief.vehicles, strict=True))
         self._uas = {uas.name: uas for uas in brief.uas}
         self._row = {uas.name: row for row, uas in enumerate(brief.uas)}
@@ -70,8 +70,8 @@ class ProblemBuilder:
         return self._vehicles[name]
 
     def seconds_left(self, name: str, dod: float) -> float:
-        """Flight time until DoD_max, at the pace of cruising."""
-        dod_max = self._uas[name].dod_max
+        """Flight time until it has to have landed, at the pace of cruising."""
+        dod_max = self.brief.dod_landed[self._row[name]]
         return (dod_max - dod) / dod_per_s(self._vehicles[name], dod_max)
 
     def seconds_home(self, name: str, position_m: FloatArray) -> float:
@@ -212,7 +212,7 @@ class ProblemBuilder:
             waypoint_index=waypoints,
             n_scenario_waypoints=len(self.waypoints_m),
             home_m=np.array([self.home_m[name] for name in names]),
-            dod_max=np.array([u.dod_max for u in uas]),
+            dod_max=np.array([self.brief.dod_landed[self._row[name]] for name in names]),
             targets=(None,) * len(names),
             ways_home=ways_home if any(ways_home) else (),
             dt_s=self.dt_s,

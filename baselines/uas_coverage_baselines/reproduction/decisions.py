@@ -35,7 +35,7 @@ def seen_at(flight: Flight, step: int) -> SwarmState:
         departed=np.ones(len(x), bool),
         returning=np.zeros(len(x), bool),
         uncovered=covered_at(flight) > step,
-        home_m=np.array([uas.start_m for uas in scenario.uas]),
+        home_m=np.array([uas.home_m for uas in scenario.uas]),
         moving_position_m=scenario.moving_positions(time_s),
         moving_velocity_mps=scenario.moving_velocities(time_s),
         responds=np.ones(len(x), bool),

@@ -108,7 +108,7 @@ class Fleet:
                 flight_model(arena.vehicles[u], speed_share=speed_share),
                 space_of(arena, u, margin_m),
                 Landing(
-                    np.array(uas.start_m, float), brief.landing_distance_m, brief.landing_speed_mps
+                    np.array(uas.home_m, float), brief.landing_distance_m, brief.landing_speed_mps
                 ),
                 self.waypoints_m,
                 self.radius_m,

@@ -54,25 +54,29 @@ class Space(NamedTuple):
     length_scale: float
     """See `vehicle.scale`."""
     least_height_m: float
-    """Above the ground, outside of the landing zone; 0: no such rule."""
-    zone_middle_m: FloatArray
-    """(2,) of the landing zone, an upright cylinder."""
+    """Above the ground, outside of the landing zones; 0: no such rule."""
+    zone_middles_m: FloatArray
+    """(2, 2) of the landing zones, upright cylinders around home and start."""
     zone_m: float
-    """Its radius."""
+    """Their radius."""
 
     @property
     def planned_height_m(self) -> float:
-        """The least height that is planned outside of the landing zone."""
+        """The least height that is planned outside of the landing zones."""
         return (
             self.least_height_m + self.length_scale * _HEIGHT_MARGIN_M
             if self.least_height_m > 0.0
             else 0.0
         )
 
+    def in_zones(self, path_m: FloatArray) -> NDArray[np.bool_]:
+        """(2, N) whether places (N, 3) lie in the landing zone around home, around the start."""
+        away_m = path_m[:, :2] - self.zone_middles_m[:, None]
+        return np.hypot(away_m[..., 0], away_m[..., 1]) <= self.zone_m
+
     def is_in_zone(self, path_m: FloatArray) -> NDArray[np.bool_]:
-        """(N,) whether places (N, 3) lie in the landing zone."""
-        away_m = path_m[:, :2] - self.zone_middle_m
-        return np.hypot(away_m[:, 0], away_m[:, 1]) <= self.zone_m
+        """(N,) whether places (N, 3) lie in a landing zone."""
+        return np.asarray(self.in_zones(path_m).any(axis=0))
 
 
 class Body(NamedTuple):
@@ -122,13 +126,13 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         fence_margin_m=min(_FENCE_MARGIN_M, margin_m),
         length_scale=float(rules["length_scale"]),
         least_height_m=height_m,
-        zone_middle_m=np.array(arena.uas[uas]["home_m"][:2], float),
+        zone_middles_m=np.array([arena.uas[uas][end][:2] for end in ("home_m", "start_m")], float),
         zone_m=float(rules["landing_zone_m"]),
     )
 
 
 def height_rows(space: Space, path_m: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Planes for the least height: above it, or within the landing zone where a UAS is low there.
+    """Planes for the least height: above it, or within a landing zone where a UAS is low there.
 
     Args:
         space: Of the UAS.
@@ -138,24 +142,26 @@ def height_rows(space: Space, path_m: FloatArray) -> tuple[IntArray, FloatArray,
         Stages (m,), normals (m, 3) and bounds (m,) of rows `normal . p <= bound`.
     """
     stages = np.arange(1, max(len(path_m) - 1, 1))
-    low = space.is_in_zone(path_m[stages])
+    in_home, in_start = space.in_zones(path_m[stages])
+    low = in_home | in_start
     low &= -path_m[stages, 2] < space.planned_height_m + space.length_scale * _MAY_SINK_M
     high = stages[~low]
     angle = 2.0 * np.pi / _ZONE_SIDES * np.arange(_ZONE_SIDES)
     sides = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_ZONE_SIDES)])
     within_m = (space.zone_m - space.length_scale * _ZONE_MARGIN_M) * np.cos(np.pi / _ZONE_SIDES)
-    side_bounds = within_m + sides[:, :2] @ space.zone_middle_m
+    home_bounds, start_bounds = (
+        within_m + sides[:, :2] @ middle_m for middle_m in space.zone_middles_m
+    )
+    side_bounds = np.where(in_home[low, None], home_bounds, start_bounds)
     return (
         np.concatenate([high, np.repeat(stages[low], _ZONE_SIDES)]),
         np.vstack([np.tile([0.0, 0.0, 1.0], (len(high), 1)), np.tile(sides, (int(low.sum()), 1))]),
-        np.concatenate(
-            [np.full(len(high), -space.planned_height_m), np.tile(side_bounds, int(low.sum()))]
-        ),
+        np.concatenate([np.full(len(high), -space.planned_height_m), side_bounds.ravel()]),
     )
 
 
 def spare_height_m(space: Space, path_m: FloatArray) -> float:
-    """Least height beyond what is planned, outside of the landing zone; start and end are free."""
+    """Least height beyond what is planned, outside of the landing zones; start and end are free."""
     if space.least_height_m <= 0.0:
         return np.inf
     outside = path_m[1:-1][~space.is_in_zone(path_m[1:-1])]
@@ -267,9 +273,12 @@ def spare_of_rules_m(space, path_m, lands):
     if space.least_height_m > 0.0:
         least_m = min(space.least_height_m, -path_m[0, 2])
         for n in range(1, n_steps + 1 - (1 if lands else 0)):
-            north_m = path_m[n, 0] - space.zone_middle_m[0]
-            east_m = path_m[n, 1] - space.zone_middle_m[1]
-            if north_m * north_m + east_m * east_m > space.zone_m * space.zone_m:
+            away_m2 = np.inf
+            for zone in range(len(space.zone_middles_m)):
+                north_m = path_m[n, 0] - space.zone_middles_m[zone, 0]
+                east_m = path_m[n, 1] - space.zone_middles_m[zone, 1]
+                away_m2 = min(away_m2, north_m * north_m + east_m * east_m)
+            if away_m2 > space.zone_m * space.zone_m:
                 spare_m = min(spare_m, -path_m[n, 2] - least_m)
     for o in range(len(space.least_m)):
         first, last = space.first[o], space.first[o + 1]

@@ -30,7 +30,7 @@ def raised(brief: MissionBrief) -> MissionBrief | None:
 
     None where nothing does, and routes would be the same.
     """
-    targets_m = [*(w.position_m[2] for w in brief.waypoints), *(u.start_m[2] for u in brief.uas)]
+    targets_m = [*(w.position_m[2] for w in brief.waypoints), *(u.home_m[2] for u in brief.uas)]
     usual_m = float(np.median(targets_m)) - _ABOVE_M
     top_m = float(brief.fence.vertices_m[:, 2].min())
     radius_m = max(uas.radius_m for uas in brief.uas)
