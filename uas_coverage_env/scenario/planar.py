@@ -16,7 +16,7 @@ from uas_coverage_env.files.strict_toml import StrictModel
 from uas_coverage_env.geometry import ConvexPolytope
 
 _UPRIGHT = 1e-9
-_TALL_M = 1_000.0
+_TALL_M = 100.0
 _AWAY_M = np.array([1e6, 0.0, 1e6])  # beyond all coordinates of scenario files, and below
 _SAME_HEIGHT_M = 1e-9
 
@@ -70,6 +70,17 @@ class Planar(StrictModel):
             np.append(offsets_m, [high_m, -low_m]),
             [(*place_m, z) for z in (low_m, high_m) for place_m in outline_m],
         )
+
+    def section(self, body: ConvexPolytope) -> ConvexPolytope:
+        """What of a body's faces tells places at this height apart: those that are not level.
+
+        Their normals are level and shorter than 1 where the face is slanted, so that distances are
+        those from the body's own faces.
+        """
+        sides = np.hypot(body.normals[:, 0], body.normals[:, 1]) > _UPRIGHT
+        normals = body.normals[sides] * (1.0, 1.0, 0.0)
+        offsets_m = body.offsets_m - body.normals[:, 2] * self.height_m
+        return ConvexPolytope(normals, offsets_m[sides], body.vertices_m)
 
 
 def completed(data: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -245,6 +245,10 @@ def _vehicles(scenario: Scenario) -> NDArray[np.void]:
     for i, vehicle in enumerate(scenario.vehicles):
         records[i] = compiled[vehicle]
     records["follows_course"] = [uas.heading == "course" for uas in scenario.uas]
+    if scenario.planar is not None:
+        # no input acts on a height that is fixed
+        records["holds_height"] = True
+        records["lift_min_N"] = records["lift_max_N"] = 0.0
     return records
 
 
@@ -301,6 +305,8 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
     rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - ROUTE_MARGIN_M
+    if scenario.planar is not None:
+        rules["floor_m"] = rules["ceiling_m"] = scenario.planar.height_m
     rules["brake"]["kind"] = CLIMB
     rules["lookahead_steps"] = lookahead_steps(scenario)
     return rules

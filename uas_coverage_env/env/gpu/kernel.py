@@ -16,6 +16,7 @@ from uas_coverage_env.compiled.kernels import in_turn, inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.compiled.views import rows_view
 from uas_coverage_env.entities.state import FLYING, as_observed
+from uas_coverage_env.env.actions.kind import ActionKind
 from uas_coverage_env.env.batch.kernel import scratch_of
 from uas_coverage_env.env.batch.lane import finish_lane_with, keep_lane_with
 from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP
@@ -116,12 +117,17 @@ def _is_refused_with(choices: int) -> Any:
 
 
 def step_with(
-    settings: MissionSettings, features: tuple[MissionFeature, ...], otherwise: bool, changes: bool
+    settings: MissionSettings,
+    kind: ActionKind,
+    features: tuple[MissionFeature, ...],
+    otherwise: bool,
+    changes: bool,
 ) -> Any:
     """The step of all lanes, to be launched.
 
     Args:
         settings: How missions are flown and paid; all of its kernels are part of the step.
+        kind: Of the actions.
         features: What the mission has of what few missions have.
         otherwise: Whether others are flown than are believed.
         changes: Whether the scene may change.
@@ -131,8 +137,8 @@ def step_with(
         `step_batch`, and observations are written where those of the step before lie.
     """
     nonlinear, width = settings.dynamics == "nonlinear", settings.observation_size
-    write = settings.kind.write
-    own = all(write is not kind.write for kind in settings.version.actions)
+    write = kind.write
+    own = all(write is not each.write for each in settings.version.actions)
     stages = stages_of(
         _write_commands_with(write, own),
         stages_on_gpu(features, nonlinear or otherwise),
@@ -140,7 +146,7 @@ def step_with(
         looks_with(settings.observation, calls=False),
     )
     fly_lane = _fly_lane_with(stages, begin_features_of(features), width)
-    is_refused = _is_refused_with(settings.kind.choices)
+    is_refused = _is_refused_with(kind.choices)
     return _launched(fly_lane, is_refused, nonlinear, changes)
 
 

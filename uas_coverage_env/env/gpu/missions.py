@@ -132,12 +132,12 @@ class CudaMissions:
         self._rows: Any = on_device(np.zeros(shape, np.float32))
         # all kernels are part of the step
         self._parts = (
-            on_device(acting_of(told.kind, (told.kind,))),
+            on_device(acting_of(pool.actions.kind, (pool.actions.kind,))),
             on_device(paying_of(told.reward, told.weights, told.reward)),
             on_device(observing_of(told.observation, told.observation)),
         )
         self._launched = step_with(
-            told, pool.features, pool.sizes["true vehicles"] > 0, pool.changes
+            told, pool.actions.kind, pool.features, pool.sizes["true vehicles"] > 0, pool.changes
         )
         self._observing = observing_of(told.observation, version.observation)  # on the host
         self._blocks = -(-num_envs // THREADS_PER_BLOCK), THREADS_PER_BLOCK
