@@ -23,7 +23,7 @@ from uas_coverage_baselines.milp_mpc.solvers import SolverLimits
 from uas_coverage_baselines.milp_mpc.solvers.highs import solve
 
 from uas_coverage_env.geometry.round_shapes import inner_factor
-from uas_coverage_env.planning.reserves import MILP_BRAKING_S
+from uas_coverage_env.planning.reserves import milp_braking_s
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
 from uas_coverage_env.vehicle.layout import DOD
 from uas_coverage_env.vehicle.range import dod_per_s, seconds_to_land
@@ -89,9 +89,8 @@ def test_the_way_home_is_never_estimated_shorter_by_the_rows_than_by_the_modes(a
 def test_the_reserve_is_no_shorter_than_the_calibrated_way_home_from_a_hover(vehicle, height_m):
     record = compile_vehicle(vehicle, 1.0)[()]
     for way_m in np.arange(50.0, 800.0, 50.0):
-        allowed_s = (
-            straight_seconds_home(vehicle, np.array([way_m, 0.0, -height_m])) + MILP_BRAKING_S
-        )
+        allowed_s = straight_seconds_home(vehicle, np.array([way_m, 0.0, -height_m]))
+        allowed_s += milp_braking_s(vehicle, 1.0)
         assert allowed_s > seconds_to_land(record, way_m, 0.0, height_m, -np.inf, way_m, 0.0)
 
 

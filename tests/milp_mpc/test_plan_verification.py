@@ -11,9 +11,9 @@ from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
-from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import load_vehicle
 from uas_coverage_env.vehicle.layout import DOD, PHI, THETA, VX, VZ, WX, WZ
+from uas_coverage_env.vehicle.scale import braking_s
 
 HEXACOPTER = load_vehicle("hexacopter")
 START = state((60.0, 60.0, -10.0), (5.0, 0.0, 0.0))
@@ -175,7 +175,7 @@ def test_a_backup_trajectory_ends_in_a_hover_whatever_was_flown(vehicle, dt_s, c
     x, u = flown(vehicle, state((0.0, 0.0, 0.0)), np.array(commands), dt_s)
     problem = toy(x[0], horizon=len(u), vehicles=[vehicle], fence=sky, dt_s=dt_s)
     out = backup_trajectory(problem, planned((x, u)), dt_s)
-    assert out.u.shape[1] == len(u) + np.ceil(BRAKING_S / dt_s)
+    assert out.u.shape[1] == len(u) + np.ceil(braking_s([vehicle], dt_s) / dt_s)
     assert speeds_mps(out.x[:, -1]) < 0.1
     assert np.abs(out.x[:, -1, [PHI, THETA, WX, WX + 1, WZ]]).max() < 0.02
 

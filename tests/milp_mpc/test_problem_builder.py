@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from practice_missions import mission, obstacle, with_uas
+from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.milp_mpc.mode_problems import ModeProblems
 from uas_coverage_baselines.milp_mpc.model.ocp import formulate
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, Target, Weights
@@ -52,15 +53,16 @@ def without_targets(scenario):
 
 def test_clearances_are_the_sums_that_the_paper_writes_and_the_margins(scenario, around):
     problem = around.problem(seen(scenario), without_targets(scenario), Weights(), 0.15)
-    options = MilpMpcOptions()
+    margins = margins_in(MissionBrief.of(scenario), None, None)
+    assert margins == (0.3, 3.0)
     assert problem.obstacle_clearance_m == pytest.approx(
-        np.array([[0.36 + 2.0], [0.5 + 2.0]]) + options.margin_m
+        np.array([[0.36 + 2.0], [0.5 + 2.0]]) + margins.fixed_m
     )
     assert problem.moving_clearance_m == pytest.approx(
-        np.array([[0.36 + 3.0], [0.5 + 3.0]]) + options.moving_margin_m
+        np.array([[0.36 + 3.0], [0.5 + 3.0]]) + margins.moving_m
     )
-    assert problem.separation_m[0, 1] == pytest.approx(0.36 + 0.5 + 5.0 + options.margin_m)
-    assert 0.5 <= problem.fence_margin_m <= 0.5 + options.margin_m
+    assert problem.separation_m[0, 1] == pytest.approx(0.36 + 0.5 + 5.0 + margins.fixed_m)
+    assert 0.5 <= problem.fence_margin_m <= 0.5 + margins.fixed_m
 
 
 def test_each_uas_is_planned_with_its_own_vehicle_and_its_own_battery(scenario, around):

@@ -43,7 +43,7 @@ PUBLIC = {
     Scenario: {
         *("schema_version", "name", "dt_s", "max_steps", "landing_distance_m"),
         *("landing_speed_mps", "uas_safe_distance_m", "min_height_m", "from_ground"),
-        *("geofence", "obstacles", "planar", "doors_m"),
+        *("route_margin_m", "geofence", "obstacles", "planar", "doors_m"),
         *("moving_obstacles", "uas", "waypoints", "decorations", "place", "execution"),
         "sorties",
     },

@@ -6,6 +6,7 @@ from uas_coverage_env.planning.backup.course import Course, are_apart
 from uas_coverage_env.planning.backup.supervisor import Supervisor
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.scale import braking_s
 
 BRAKING = 14
 
@@ -19,7 +20,9 @@ def straight(start_m, velocity_mps, steps, begin=0, lands=True):
 
 
 def supervisor_of(n_uas=1, dt_s=1.0):
-    return Supervisor([compile_vehicle(load_vehicle("s500_v2"), dt_s)[()]] * n_uas, dt_s)
+    vehicle = load_vehicle("s500_v2")
+    records = [compile_vehicle(vehicle, dt_s)[()]] * n_uas
+    return Supervisor(records, dt_s, braking_s([vehicle], dt_s))
 
 
 class World:

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from backup_worlds import straight
+from backup_worlds import straight, supervisor_of
 
 from uas_coverage_env.planning.backup.course import are_apart, braked
-from uas_coverage_env.planning.backup.supervisor import Supervisor
 from uas_coverage_env.vehicle import compile_vehicle, load_vehicle
 from uas_coverage_env.vehicle import layout as S
 
@@ -46,7 +45,7 @@ def test_a_hover_is_held_and_a_uas_that_has_landed_is_gone():
 @pytest.mark.parametrize(("dt_s", "steps"), [(1.0, 14), (0.8, 18), (0.5, 28)])
 def test_a_course_is_followed_for_some_steps_and_then_braked_to_a_hover(dt_s, steps):
     vehicle = compile_vehicle(load_vehicle("s500_v2"), dt_s)[()]
-    assert Supervisor([vehicle], dt_s).braking_steps == steps
+    assert supervisor_of(dt_s=dt_s).braking_steps == steps
     course = straight(START, (6.0, 0.0, 0.0), 9, begin=4)
     for followed in (0, 1, 5, 9):
         trial = braked(vehicle, course, followed, steps)

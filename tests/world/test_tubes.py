@@ -11,8 +11,8 @@ from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import with_disturbances
 from uas_coverage_env.scenario.levels import DISTURBANCE_LEVELS
 from uas_coverage_env.world import GoTo, Velocity, build_arena
-from uas_coverage_env.world.obstacles import ROUTE_MARGIN_M
-from uas_coverage_env.world.tubes import UNKNOWN_M
+from uas_coverage_env.world.obstacles import route_margin_m
+from uas_coverage_env.world.tubes import UNKNOWN
 
 TOWER = box("tower", (90.0, 90.0, -50.0), (110.0, 110.0, 0.0))
 TOWN = meadow(((40.0, 100.0, -20.0),), obstacles=(TOWER,), waypoints=(waypoint((160, 100, -20)),))
@@ -28,7 +28,7 @@ def test_in_still_air_there_is_no_tube():
 
 def test_where_nothing_is_stated_the_least_is_kept():
     arena = World(TOWN, disturbances=(constant_wind(3.0, 0.0),)).arena
-    assert (arena.tube_m == UNKNOWN_M).all()
+    assert (arena.tube_m == UNKNOWN * route_margin_m(TOWN)).all()
     assert arena.obstacles["wall_m"] == build_arena(TOWN).obstacles["wall_m"]
 
 
@@ -38,13 +38,14 @@ def test_the_tube_grows_along_the_horizon_and_planners_know_it_as_the_world_does
     arena = World(scenario).arena
     (tube_m,) = arena.tube_m
     assert (np.diff(tube_m) >= 0.0).all()
-    assert tube_m[0] == UNKNOWN_M < tube_m[3] < tube_m[-1]
+    unknown_m = UNKNOWN * route_margin_m(scenario)
+    assert tube_m[0] == unknown_m < tube_m[3] < tube_m[-1]
     planners = build_arena(MissionBrief.of(scenario).as_scenario())
     np.testing.assert_array_equal(planners.tube_m, arena.tube_m)
     # routes pass the tower with the whole tube beside them
     more_m = arena.obstacles["wall_m"] - build_arena(TOWN).obstacles["wall_m"]
-    assert more_m == pytest.approx(tube_m[-1] - UNKNOWN_M)
-    assert UNKNOWN_M < ROUTE_MARGIN_M
+    assert more_m == pytest.approx(tube_m[-1] - unknown_m)
+    assert unknown_m < route_margin_m(scenario)
     np.testing.assert_array_equal(planners.nodes_m, arena.nodes_m)
 
 

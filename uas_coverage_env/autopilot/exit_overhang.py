@@ -19,7 +19,7 @@ from uas_coverage_env.world.routes import line_is_clear
 LEG_TO_TARGET, LEG_TO_PLACE, TARGET_IS_PLACE = range(3)
 """What `past_overhangs` returns."""
 
-_CELL_M = 2.0  # of the grid
+_CELL_M = 2.0  # of the grid, at scale 1
 _REACH = 20  # cells to each side: 40 m; both chosen by hand, `tests/autopilot/test_overhangs.py`
 _SIDE = 2 * _REACH + 1
 _N_CELLS = _SIDE**3
@@ -53,6 +53,7 @@ def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
     Returns:
         How many places; 0 where the grid has no way.
     """
+    cell_m = arena.rules[0].length_scale * _CELL_M
     before = np.full(_N_CELLS, -1, np.int32)
     queue = np.empty(_N_CELLS, np.int32)
     depth = np.zeros(_N_CELLS, np.int32)
@@ -65,14 +66,14 @@ def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
         cell = queue[head]
         head += 1
         # what is found later is farther: it cannot be on a shorter way
-        if depth[cell] * _CELL_M >= best_m:
+        if depth[cell] * cell_m >= best_m:
             break
         a, b, c = cell // (_SIDE * _SIDE), cell // _SIDE % _SIDE, cell % _SIDE
-        x = x0 + (a - _REACH) * _CELL_M
-        y = y0 + (b - _REACH) * _CELL_M
-        z = z0 + (c - _REACH) * _CELL_M
+        x = x0 + (a - _REACH) * cell_m
+        y = y0 + (b - _REACH) * cell_m
+        z = z0 + (c - _REACH) * cell_m
         if not is_below_overhang(arena, x, y, z):
-            whole_m = depth[cell] * _CELL_M + math.hypot(x1 - x, y1 - y)
+            whole_m = depth[cell] * cell_m + math.hypot(x1 - x, y1 - y)
             if whole_m < best_m:
                 best, best_m = cell, whole_m
             continue
@@ -83,9 +84,9 @@ def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
             following = (a1 * _SIDE + b1) * _SIDE + c1
             if before[following] >= 0:
                 continue
-            there_x = x0 + (a1 - _REACH) * _CELL_M
-            there_y = y0 + (b1 - _REACH) * _CELL_M
-            there_z = z0 + (c1 - _REACH) * _CELL_M
+            there_x = x0 + (a1 - _REACH) * cell_m
+            there_y = y0 + (b1 - _REACH) * cell_m
+            there_z = z0 + (c1 - _REACH) * cell_m
             if _is_free(arena, i, x0, y0, z0, there_x, there_y, there_z) and line_is_clear(
                 arena, x, y, z, there_x, there_y, there_z
             ):
@@ -99,9 +100,9 @@ def way_out(arena, i, x0, y0, z0, x1, y1, places_m):
     cell = best
     for k in range(depth[best] - 1, -1, -1):
         if k < count:
-            places_m[k, 0] = x0 + (cell // (_SIDE * _SIDE) - _REACH) * _CELL_M
-            places_m[k, 1] = y0 + (cell // _SIDE % _SIDE - _REACH) * _CELL_M
-            places_m[k, 2] = z0 + (cell % _SIDE - _REACH) * _CELL_M
+            places_m[k, 0] = x0 + (cell // (_SIDE * _SIDE) - _REACH) * cell_m
+            places_m[k, 1] = y0 + (cell // _SIDE % _SIDE - _REACH) * cell_m
+            places_m[k, 2] = z0 + (cell % _SIDE - _REACH) * cell_m
         cell = before[cell]
     return count
 

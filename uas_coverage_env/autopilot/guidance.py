@@ -32,17 +32,17 @@ LEAD_S = 1.6
 """The inner loop follows a velocity with about this delay; guidance steers from ahead [s]."""
 
 CRUISE_ALTITUDE_M = 8.0
-"""On a longer way UAS do not sink below this altitude above the floor [m]."""
+"""On a longer way UAS do not sink below this altitude above the floor, at scale 1 [m]."""
 
 HEADROOM_M = 0.5
-"""Roofs are passed this much above the distance of routes [m]."""
+"""Roofs are passed this much above the distance of routes, at scale 1 [m]."""
 
 _GLIDE_SLOPE = 0.12  # metres down a metre of way, towards the altitude of the target [-]
-_GLIDE_ENDS_M = 15.0  # before the target [m]
+_GLIDE_ENDS_M = 15.0  # before the target, at scale 1 [m]
 
 _TIGHT_M = 3.0
 """A corner so near to what routes avoid of two obstacles lies in a gap that is seen through from
-there alone: UAS come to rest at it before they turn [m]."""
+there alone, at scale 1: UAS come to rest at it before they turn [m]."""
 
 _STOPPING_PER_S = 0.28
 """Speed over distance on the way to a stop [1/s]."""
@@ -54,7 +54,7 @@ _PASSING_SHARE, _PASSING_PER_S = 0.75, 0.8
 """Speed past a waypoint: of the highest [-], and over its radius [1/s], whichever is less."""
 
 _SLOWING_PER_S, _SLOWED_M = 0.2, 8.0
-"""By how much faster a metre before it [1/s], down to this distance from it [m]."""
+"""By how much faster a metre before it [1/s], down to this distance from it, at scale 1 [m]."""
 
 _HEIGHT_SHARE, _CLIMBING_MPS = 0.6, 0.5
 """Of its radius, how far above or below its centre a waypoint is covered for sure [-]; and what is
@@ -153,6 +153,7 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
     needed_m = -math.inf
     speed_mps = arena.uas[i].speed_mps
     ceiling_m = arena.rules[0].ceiling_m
+    headroom_m = arena.rules[0].length_scale * HEADROOM_M
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         at, over, ends = crossing(obstacle, arena.normals, arena.offsets_m, x[S.X], x[S.Y], x1, y1)
@@ -161,10 +162,10 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
         roof_m = obstacle.roof_m
         if not passes_over(obstacle, over, ends, leg, max(altitude_m, altitude1_m)):
             continue
-        needed_m = max(needed_m, roof_m + HEADROOM_M)
+        needed_m = max(needed_m, roof_m + headroom_m)
         # where it can be passed right below the ceiling, no more height is waited for
-        if roof_m > ceiling_m > obstacle.top_m + HEADROOM_M:
-            roof_m = ceiling_m - HEADROOM_M
+        if roof_m > ceiling_m > obstacle.top_m + headroom_m:
+            roof_m = ceiling_m - headroom_m
         rise_m = roof_m - altitude_m
         if rise_m > 0.0:
             climbing_s = rise_m / arena.uas[i].climb_mps + LEAD_S
@@ -181,7 +182,7 @@ def _is_tight(arena, x, y):
         if obstacle.tall and not level_apart(obstacle, x, y, x, y):
             first, last = obstacle.first_side, obstacle.last_side
             away_m = signed_distance(arena.normals, arena.offsets_m, first, last, x, y, 0.0)
-            n_near += away_m < _TIGHT_M
+            n_near += away_m < arena.rules[0].length_scale * _TIGHT_M
     return n_near > 1
 
 
@@ -203,7 +204,7 @@ def _passing_speed(arena, i, x, target, distance_m, altitude1_m):
     uas = arena.uas[i]
     radius_m = arena.waypoints[target].radius_m
     passing_mps = min(_PASSING_SHARE * uas.speed_mps, _PASSING_PER_S * radius_m)
-    before_m = max(0.0, distance_m - _SLOWED_M)
+    before_m = max(0.0, distance_m - arena.rules[0].length_scale * _SLOWED_M)
     speed_mps = min(uas.speed_mps, passing_mps + _SLOWING_PER_S * before_m)
     missing_m = abs(altitude1_m + x[S.Z]) - _HEIGHT_SHARE * radius_m
     if missing_m > 0.0:
@@ -230,8 +231,8 @@ def _approach_speed(arena, i, x, target, stop, brakes_late, distance_m, leg, alt
 def _altitude(arena, i, x, altitude1_m, way_m, needed_m):
     """Altitude to hold [m]: descend along a glide slope, but stay over what has to be passed."""
     rules = arena.rules[0]
-    glide_m = altitude1_m + _GLIDE_SLOPE * max(0.0, way_m - _GLIDE_ENDS_M)
-    cruise_m = max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M)
+    glide_m = altitude1_m + _GLIDE_SLOPE * max(0.0, way_m - rules.length_scale * _GLIDE_ENDS_M)
+    cruise_m = max(-x[S.Z], rules.floor_m + rules.length_scale * CRUISE_ALTITUDE_M)
     altitude_m = max(altitude1_m, min(cruise_m, glide_m), needed_m)
     floor_m = lowest_altitude(arena, i, x[S.X], x[S.Y])
     return min(max(altitude_m, floor_m), max(rules.ceiling_m, altitude1_m))
@@ -288,13 +289,14 @@ def _write_safe(
     arena, i, x, reference, north_mps, east_mps, altitude_m, leg, nonlinear, command, path_m, belief
 ):
     """Write the wish, a velocity and an altitude, or the first of `_TRIES` that leaves room."""
+    headroom_m = arena.rules[0].length_scale * HEADROOM_M
     for k in range(_TRIES.shape[0]):
         along, aside, height = _TRIES[k]
         wanted_m = altitude_m
         if height == _LEVEL:
             # what is in the way of a descent is not in the way of staying up
             wanted_m = max(altitude_m, -x[S.Z] - x[S.VZ])
-        elif height == _IN_PLACE and abs(altitude_m + x[S.Z]) <= HEADROOM_M:
+        elif height == _IN_PLACE and abs(altitude_m + x[S.Z]) <= headroom_m:
             continue
         elif height == _STRAIGHT_ON:
             if leg != CLEAR or not arena.rules[0].overhangs:

@@ -21,7 +21,7 @@ LITTLE_MPS = 2.0
 """Headway below which a UAS flies low: of a wind that is known to about a metre per second. What
 flying low is worth: docs/wind_method.md."""
 
-_HERE_M = 2.0  # a place so near has been reached
+_HERE_M = 2.0  # a place so near has been reached, at scale 1
 
 
 @kernel
@@ -29,7 +29,7 @@ def _headway_mps(arena, i, x, belief, x1, y1, altitude_m):
     """Ground speed at full airspeed along a leg, at an altitude or where the UAS is higher."""
     north_m, east_m = x1 - x[S.X], y1 - x[S.Y]
     length_m = math.hypot(north_m, east_m)
-    if length_m < _HERE_M:
+    if length_m < arena.rules[0].length_scale * _HERE_M:
         return math.inf
     share = wind_growth(max(altitude_m, -x[S.Z]), -x[S.Z])
     return speed_along(
@@ -43,7 +43,7 @@ def _seconds(arena, i, belief, x0, y0, x1, y1, share):
     """Time that a leg takes in a share of the wind believed in [s]."""
     north_m, east_m = x1 - x0, y1 - y0
     length_m = math.hypot(north_m, east_m)
-    if length_m < _HERE_M:
+    if length_m < arena.rules[0].length_scale * _HERE_M:
         return 0.0
     return length_m / estimated_speed(
         arena.vehicles[i].reference_max_mps, arena.uas[i].speed_mps,
@@ -54,7 +54,9 @@ def _seconds(arena, i, belief, x0, y0, x1, y1, share):
 @kernel
 def _is_free(arena, x0, y0, x1, y1, z):
     """Whether a leg crosses no widened footprint and ends outside of all, inside the fence."""
-    if inside_fence_m(arena, x1, y1, z) < arena.rules[0].fence_margin_m + NODE_MARGIN_M:
+    if inside_fence_m(arena, x1, y1, z) < (
+        arena.rules[0].fence_margin_m + arena.rules[0].length_scale * NODE_MARGIN_M
+    ):
         return False
     for o in range(arena.obstacles.shape[0]):
         at, over, ends = crossing(
@@ -88,6 +90,7 @@ def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
         North and east [m] of the corner of its widened box by which the UAS is at the end first;
         of the end where it is sooner over the obstacle, or no corner can be flown to.
     """
+    scale = arena.rules[0].length_scale
     nearest, crossed = 2.0, -1
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
@@ -104,7 +107,7 @@ def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
     corner_x, corner_y, onward_s = stack_array(4), stack_array(4), stack_array(4)
     for c in range(4):
         north, east = 2 * (c // 2) - 1, 2 * (c % 2) - 1
-        out_m = obstacle.wall_m + NODE_MARGIN_M
+        out_m = obstacle.wall_m + scale * NODE_MARGIN_M
         corner_x[c] = obstacle.hull_middle_m[0] + north * (obstacle.hull_half_m[0] + out_m)
         corner_y[c] = obstacle.hull_middle_m[1] + east * (obstacle.hull_half_m[1] + out_m)
         at, _, _ = crossing(
@@ -126,7 +129,7 @@ def _beside_roof(arena, i, x, belief, x1, y1, needed_m):
     best_x, best_y = x1, y1
     for c in range(4):
         to_s = _seconds(arena, i, belief, x[S.X], x[S.Y], corner_x[c], corner_y[c], first)
-        here = math.hypot(corner_x[c] - x[S.X], corner_y[c] - x[S.Y]) < _HERE_M
+        here = math.hypot(corner_x[c] - x[S.X], corner_y[c] - x[S.Y]) < scale * _HERE_M
         if (
             to_s + onward_s[c] < best_s
             and not here

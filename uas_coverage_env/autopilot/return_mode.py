@@ -18,9 +18,6 @@ RETURN_MODE = TravelTimeModel(speed_share=2.0 / 3.0, in_turn=True, landing_s=12.
 """On the way home a UAS turns, climbs, and is held up by others. Chosen by hand;
 `benchmarks/returns.py` shows what it costs. Recorded flights and trained policies depend on it."""
 
-_CLOCK_RESERVE_S = 30.0
-"""Left of the mission when a UAS has landed [s]."""
-
 _STEPS_LATER = 3.0
 """What a step takes from what is left of the way home, in steps: the step itself, a step farther
 away at full speed, and half a turn more."""
@@ -99,7 +96,7 @@ def _calls_home(arena, state, i, share, more_s):
     uas = arena.uas[i]
     home_s = share * seconds_home(arena, i, x) + more_s
     time_left_s = (rules.max_steps - state.step[0]) * rules.dt_s
-    if home_s + _CLOCK_RESERVE_S - RETURN_MODE.landing_s > time_left_s:
+    if home_s + rules.clock_reserve_s - RETURN_MODE.landing_s > time_left_s:
         return True
     if x[S.DOD] + home_s * uas.dod_per_s >= uas.dod_max:
         return True

@@ -55,7 +55,7 @@ def _roofs_on_leg(arena, x0, y0, altitude0_m, x1, y1, altitude1_m, leg):
         if at > 1.0 or not passes_over(obstacle, over, ends, leg, highest_m):
             continue
         back, _, _ = crossing(obstacle, arena.normals, arena.offsets_m, x1, y1, x0, y0)
-        roof_m = max(roof_m, obstacle.roof_m + HEADROOM_M)
+        roof_m = max(roof_m, obstacle.roof_m + arena.rules[0].length_scale * HEADROOM_M)
         first_m = min(first_m, at * length_m)
         last_m = max(last_m, (1.0 - min(back, 1.0)) * length_m)
     return roof_m, first_m, last_m

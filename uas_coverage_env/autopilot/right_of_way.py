@@ -18,8 +18,8 @@ CLAIMED_S = 5.0
 by hand; `benchmarks/right_of_way.py` shows which UAS come home."""
 
 ELBOW_ROOM_M = 1.0
-"""What claimed ways are kept clear of, beyond the distance that counts as a breach [m]: the next
-command home is not quite the one that was claimed."""
+"""What claimed ways are kept clear of, beyond the distance that counts as a breach, at scale 1 [m]:
+the next command home is not quite the one that was claimed."""
 
 
 @kernel
@@ -60,16 +60,17 @@ def room_beside(arena, i, path_m, claimants, n_claims, claims_m):
     (U, N+1, 3), by the index of the UAS.
 
     Returns:
-        The least room to spare along the path, at most ELBOW_ROOM_M; where it is negative, less a
+        The least room to spare along the path, at most the elbow room; where it is negative, less a
         little for every step with too little room, so that leaving early is better than late.
     """
     n_steps = path_m.shape[0] - 1
-    least_m, shortfall_m = ELBOW_ROOM_M, 0.0
+    elbow_room_m = arena.rules[0].length_scale * ELBOW_ROOM_M
+    least_m, shortfall_m = elbow_room_m, 0.0
     for c in range(n_claims):
         other = claimants[c]
         way_m = claims_m[other]
         radii_m = arena.uas[i].radius_m + arena.uas[other].radius_m
-        required_m = radii_m + arena.rules[0].uas_safe_distance_m + ELBOW_ROOM_M
+        required_m = radii_m + arena.rules[0].uas_safe_distance_m + elbow_room_m
         for k in range(n_steps):
             room_m = separation_at(path_m, way_m, k) - required_m
             least_m = min(least_m, room_m)

@@ -27,8 +27,8 @@ from uas_coverage_env.autopilot.right_of_way import claim_way, decision_order, r
 from uas_coverage_env.compiled.kernels import allocating_kernel, kernel
 from uas_coverage_env.entities.commands import ACCELERATION, CLIMB, N_VALUES, VELOCITY
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.scale import SLOW_SHARE
 
-_LEAST_SPEED_MPS = 3.0  # deflections of a slower wish are as fast; chosen by hand
 _AS_WISHED, _CLIMBING, _SINKING, _LEVEL = range(4)
 _TURN_RAD, _SPEED_SHARE, _HEIGHT = range(3)
 _NOTICEABLE_M = 1e-3  # less room to claims makes no difference
@@ -89,7 +89,9 @@ def _deflect(arena, i, wish_mps, d, command):
     uas = arena.uas[i]
     speed_mps = math.hypot(wish_mps[0], wish_mps[1])
     heading = math.atan2(wish_mps[1], wish_mps[0]) + _DEFLECTIONS[d, _TURN_RAD]
-    share_mps = min(max(speed_mps, _LEAST_SPEED_MPS), uas.speed_mps) * _DEFLECTIONS[d, _SPEED_SHARE]
+    # deflections of a wish to go slower are as fast as is slow
+    speed_mps = min(max(speed_mps, SLOW_SHARE * uas.speed_mps), uas.speed_mps)
+    share_mps = speed_mps * _DEFLECTIONS[d, _SPEED_SHARE]
     height = _DEFLECTIONS[d, _HEIGHT]
     down_mps = wish_mps[2]
     if height == _CLIMBING:

@@ -36,8 +36,8 @@ from uas_coverage_env.simulation import World
 from uas_coverage_env.tasks.levels import LEVELS
 from uas_coverage_env.vehicle.tube import tube_of
 from uas_coverage_env.world.arena import lookahead_steps
-from uas_coverage_env.world.obstacles import ROUTE_MARGIN_M
-from uas_coverage_env.world.tubes import UNKNOWN_M
+from uas_coverage_env.world.obstacles import route_margin_m
+from uas_coverage_env.world.tubes import UNKNOWN
 
 _PICTURE_PX = 1024
 _NAMED, _NAMED_IN_WARNINGS = 8, 50
@@ -167,8 +167,8 @@ def _closed_off(scenario: Scenario, access: Access) -> Iterator[str]:
         yield (
             f"{len(closed)} of {len(scenario.waypoints)} waypoints have no way to them: "
             f"{_named(list(closed), _NAMED_IN_WARNINGS)}; {_first(list(closed.values()))}. Routes "
-            f"keep {ROUTE_MARGIN_M:g} m more than the safe distances: widen the gaps, or move or "
-            f"take away what is closed off"
+            f"keep {route_margin_m(scenario):.2g} m more than the safe distances: widen the "
+            f"gaps, or move or take away what is closed off"
         )
 
 
@@ -276,10 +276,11 @@ def _tubes(scenario: Scenario) -> list[str]:
         f"stated: mean wind up to {stated.mean_mps:g} m/s, of which up to "
         f"{stated.unknown_mps:.1f} m/s at a time is not known in flight"
     ]
-    steps, slowly_m = lookahead_steps(scenario), UNKNOWN_M
+    steps, unknown_m = lookahead_steps(scenario), UNKNOWN * route_margin_m(scenario)
+    slowly_m = unknown_m
     for vehicle in dict.fromkeys(scenario.vehicles):
         tube = tube_of(vehicle, scenario.dt_s, steps, learns=True)
-        kept_m = np.maximum(UNKNOWN_M, stated.unknown_mps * tube.position)
+        kept_m = np.maximum(unknown_m, stated.unknown_mps * tube.position)
         at = (1, round(_SLOWLY_S / scenario.dt_s), steps)
         after = ", ".join(f"{kept_m[k]:.1f}" for k in at)
         at_s = ", ".join(f"{k * scenario.dt_s:g}" for k in at)

@@ -28,7 +28,7 @@ class Access:
 
     A waypoint is closed off where no place in its sphere that keeps all safe distances has a way
     home, neither round what stands in between nor over it below the ceiling. Routes keep more than
-    the safe distances (`ROUTE_MARGIN_M`): a planner may find a way through a gap that is closed to
+    the safe distances (`route_margin_m`): a planner may find a way through a gap that is closed to
     them.
 
     Args:

@@ -8,15 +8,13 @@ from numpy.typing import NDArray
 from uas_coverage_env.autopilot.guidance import velocity_of
 from uas_coverage_env.mission.brief import MissionBrief
 from uas_coverage_env.mission.views import WorldView
+from uas_coverage_env.vehicle.scale import SLOW_SHARE, length_scale
 from uas_coverage_env.world import Arena, GoTo, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
 
-CAREFUL_MPS = 3.0
-"""Fast enough to get there, slow enough to turn into a gap that guidance overshoots [m/s]."""
-
 _SPARE_M = 1.0
-"""Beyond safe distances and the margin of the fence: guidance stops short of them."""
+"""Beyond safe distances and the margin of the fence, at scale 1: guidance stops short of them."""
 
 _WITHIN = 0.9
 """Share of a waypoint's radius by which its aim may lie beside its centre."""
@@ -41,18 +39,19 @@ def _free_aim_m(brief: MissionBrief, waypoint: int) -> FloatArray:
     most_m = _WITHIN * brief.waypoints[waypoint].radius_m
     heights_m = brief.waypoints[waypoint].heights_m
     uas_m = max(uas.radius_m for uas in brief.uas)
-    fence_m = brief.geofence.margin_m + _SPARE_M
+    spare_m = _SPARE_M * length_scale(brief.vehicles, brief.dt_s)
+    fence_m = brief.geofence.margin_m + spare_m
     aim_m: FloatArray = centre_m.copy()
     for _ in range(_ROUNDS):
         before_m = aim_m.copy()
         if brief.min_height_m:
-            aim_m[2] = min(aim_m[2], -brief.min_height_m - _SPARE_M)
+            aim_m[2] = min(aim_m[2], -brief.min_height_m - spare_m)
         if heights_m is not None:
             aim_m[2] = min(max(aim_m[2], -heights_m[1]), -heights_m[0])
         for obstacle, hull in zip(brief.obstacles, brief.kept_hulls, strict=True):
             away_m = hull.face_distances(aim_m)
             face = int(away_m.argmax())
-            missing_m = uas_m + obstacle.safe_distance_m + _SPARE_M - float(away_m[face])
+            missing_m = uas_m + obstacle.safe_distance_m + spare_m - float(away_m[face])
             aim_m += max(missing_m, 0.0) * hull.normals[face]
         for normal, offset_m in zip(brief.fence.normals, brief.fence.offsets_m, strict=True):
             beyond_m = float(normal @ aim_m) + offset_m + fence_m
@@ -76,9 +75,12 @@ def with_free_aims(brief: MissionBrief) -> MissionBrief:
 
 
 def carefully(arena: Arena) -> Arena:
-    """The arena with UAS that guidance flies slowly."""
+    """The arena with UAS that guidance flies slowly.
+
+    Fast enough to get there, slow enough to turn into a gap that guidance overshoots.
+    """
     uas = arena.uas.copy()
-    uas["speed_mps"] = np.minimum(uas["speed_mps"], CAREFUL_MPS)
+    uas["speed_mps"] *= SLOW_SHARE
     return arena._replace(uas=uas)
 
 

@@ -66,6 +66,7 @@ class MissionBrief(StrictModel):
         landing_speed_mps: ... when it is slower than this [m/s].
         uas_safe_distance_m: Kept between two UAS in addition to their radii [m].
         min_height_m: Least height above the ground and above roofs; 0: no such rule [m].
+        route_margin_m: What routes keep beyond what counts as a breach; None: derived [m].
         from_ground: Whether charge is drawn for take-off before t = 0, and for landing at the end.
         planar: The height at which all UAS fly; None where they fly in space.
         geofence: The volume to stay in.
@@ -103,6 +104,7 @@ class MissionBrief(StrictModel):
     planar: Planar | None = None
     doors_m: tuple[tuple[float, float], ...] = ()
     place: Place | None = None
+    route_margin_m: float | None = None
     conditions: Conditions | None = None
     execution: Execution | None = None
     sorties: Sorties | None = None

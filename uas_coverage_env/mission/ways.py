@@ -26,17 +26,18 @@ released at a corner, it would be drawn back along the wall on the wrong side [s
 
 _AT_CORNER_M = 5.0
 _AHEAD_S = 2.0
-"""A corner is reached at a distance of so many metres, or seconds of flight."""
+"""A corner is reached at a distance of so many metres at scale 1, or seconds of flight."""
 
 _TIGHT_M = 12.0
-"""A corner with two obstacles nearer than this is at a gap: not to be passed at full speed [m]."""
+"""A corner with two obstacles nearer than this, at scale 1, is at a gap: not to be passed at full
+speed [m]."""
 
 _CORNERS = 8
 """Of a way, at most, that lie so near to each other."""
 
 _PAST_M = 0.01
 
-_HEADROOM_M = 0.5
+_HEADROOM_M = 0.5  # at scale 1
 
 
 class Way(NamedTuple):
@@ -78,12 +79,13 @@ class Ways:
 
     def __init__(self, brief: MissionBrief) -> None:
         self._arena = build_arena(brief.as_scenario())
+        self._scale = float(self._arena.rules["length_scale"][0])
         self._speeds = [speeds_of(vehicle) for vehicle in brief.vehicles]
         nodes_m = np.pad(self._arena.nodes_m, ((0, 0), (0, 1)))
         near = np.zeros(len(nodes_m), np.int64)
         for hull in brief.hulls:
             nodes_m[:, 2] = hull.vertices_m[:, 2].mean()
-            near += hull.signed_distance(nodes_m) < _TIGHT_M
+            near += hull.signed_distance(nodes_m) < self._scale * _TIGHT_M
         self._tight = {tuple(node) for node in self._arena.nodes_m[near > 1].tolist()}
         self._waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self._led: set[tuple[int, int]] = set()
@@ -116,7 +118,9 @@ class Ways:
                     self._led.discard((uas, row))
                 return Way(first.seconds, False, target_m, 0.0, 0.0)
             tight = tuple(leg.end_m[:2].tolist()) in self._tight
-            near_m = _AT_CORNER_M if tight else max(_AT_CORNER_M, _AHEAD_S * speed_mps)
+            near_m = self._scale * _AT_CORNER_M
+            if not tight:
+                near_m = max(near_m, _AHEAD_S * speed_mps)
             if not leg.at_corner or _level_m(leg.end_m - here_m) > near_m:
                 break
             # from a corner itself the next one is the same
@@ -173,7 +177,7 @@ class Ways:
         if begins == 1.0:
             return float(top_m), target_m
         level_m = here_m[:2] + begins * (target_m[:2] - here_m[:2])
-        return top_m, np.array([*level_m, top_m - _HEADROOM_M])
+        return top_m, np.array([*level_m, top_m - self._scale * _HEADROOM_M])
 
     def _seconds(self, uas: int, way_m: float, up_m: float, down_m: float) -> float:
         return float(flight_seconds(ROUTED, self._speeds[uas], 0.0, way_m, up_m, down_m))

@@ -9,7 +9,9 @@ rules of the world stand with them: `vehicle.range.CALIBRATED` and `ROUTED`,
 
 from typing import NamedTuple
 
+from uas_coverage_env.vehicle.params import VehicleParams
 from uas_coverage_env.vehicle.range import TravelTimeModel
+from uas_coverage_env.vehicle.scale import braking_s
 
 MILP_RESERVE = TravelTimeModel(speed_share=0.9, detour=1.1, in_turn=True, landing_s=6.0)
 """Of the reserve of `milp-mpc`: linear in the place, hence no look at what stands in the way.
@@ -90,7 +92,7 @@ LEARNED_ROUTE = TRAJECTORY._replace(
 )
 ORDER_GUIDE = Reserve(
     "the order of `milp-mpc` (`order=search`, and in wind): somewhat more than `MILP_RESERVE` and "
-    "`MILP_BRAKING_S` hold back",
+    "`milp_braking_s` hold back",
     "`uas-coverage compare --scenarios test --planners milp-mpc --seeds 0:1 --out test`; "
     "chosen by hand",
     kept_s=25.0,
@@ -105,11 +107,13 @@ ROUTE_HOME_RESERVE = Reserve(
 RESERVES = {name: value for name, value in globals().items() if isinstance(value, Reserve)}
 """All of them, by name."""
 
-BRAKING_S = 14.0
-"""Braking with the inner loop has ended after this time, from any speed [s]. What it is enough for:
-`tests/milp_mpc/test_plan_verification.py`."""
+_TURNING_HOME_S = 2.0
 
-MILP_BRAKING_S = 16.0
-"""Of `milp-mpc`: braking to a hover where a plan ends, and turning home [s]. Twice the 8 s of its
-first version, in which braking did not fit; the command is not recorded. What it is enough for:
-`tests/milp_mpc/test_battery_reserve.py`."""
+
+def milp_braking_s(vehicle: VehicleParams, dt_s: float) -> float:
+    """Of `milp-mpc`: braking to a hover where a plan ends, and turning home [s].
+
+    16 s for the shipped vehicles, twice the 8 s of its first version, in which braking did not fit;
+    the command is not recorded. What it is enough for: `tests/milp_mpc/test_battery_reserve.py`.
+    """
+    return braking_s((vehicle,), dt_s) + _TURNING_HOME_S

@@ -75,6 +75,7 @@ class UncheckedScenario(_Tables):
     landing_speed_mps: Annotated[float, Field(gt=0.0, le=100.0)]
     uas_safe_distance_m: Distance_m
     min_height_m: Distance_m = 0.0
+    route_margin_m: Distance_m | None = None
     from_ground: bool = False
     relaunch: bool = False
     doors_m: Annotated[tuple[Level_m, ...], Strict(False)] = ()
@@ -118,7 +119,7 @@ class UncheckedScenario(_Tables):
         # files, and what is computed from their content, are those of scenarios before the field
         data = serialise(self)
         for name, field in type(self).model_fields.items():
-            if name not in _ALWAYS and not field.is_required() and not getattr(self, name):
+            if name not in _ALWAYS and not field.is_required() and data.get(name) == field.default:
                 data.pop(name, None)
         return data
 

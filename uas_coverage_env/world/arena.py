@@ -14,16 +14,16 @@ from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
-from uas_coverage_env.vehicle.stopping import stopping_of
+from uas_coverage_env.vehicle.scale import braking_s, clock_reserve_s, length_scale
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
 from uas_coverage_env.world.corners import route_corners
 from uas_coverage_env.world.events import EVENT_DTYPE, event_records, is_eventful
 from uas_coverage_env.world.obstacles import (
     OBSTACLE_DTYPE,
-    ROUTE_MARGIN_M,
     measure,
     obstacle_records,
     overfly_limit,
+    route_margin_m,
 )
 from uas_coverage_env.world.packs import PACKS_DTYPE, pack_records
 from uas_coverage_env.world.sensing import SENSING_DTYPE, sensing_records
@@ -38,11 +38,8 @@ from uas_coverage_env.world.waypoints import (
     waypoint_records,
 )
 
-_LOOKAHEAD_S = 14.0
-"""The shipped vehicles brake within this from the highest speed, in strong wind, too [s]."""
-
-_IN_WIND = 1.15
-"""In wind a heavier or faster vehicle is taken to brake so many times as long as in still air."""
+_CLOCK_RESERVE_S = 30.0
+"""Left of the mission when return mode has landed a UAS, of one that is not short [s]."""
 
 SAMPLES_AFTER_END = 64
 """Moving obstacles are known this long after max_steps, for missions flown over time."""
@@ -89,6 +86,10 @@ RULES_DTYPE = record_dtype(
         # the lowest and highest altitude that guidance flies at, positive up
         ("floor_m", "f8"),
         ("ceiling_m", "f8"),
+        # of the lengths of guidance and filter, see `vehicle.scale`; and what return mode leaves
+        # of the clock
+        ("length_scale", "f8"),
+        ("clock_reserve_s", "f8"),
         # how far guidance and safety filter look ahead: time to brake from any speed
         ("lookahead_steps", "i8"),
         # whether any disturbance acts
@@ -193,8 +194,11 @@ def build_arena(
     overfly_m = overfly_limit(-targets_m[:, 2], float(rules["ceiling_m"][0]))
     feature_rows, feature_words = feature_tables(features, len(uas))
     rules["disturbed"] = any(feature is not None and feature.disturbs for feature in features)
-    tube_m = tubes_m(scenario, int(rules["lookahead_steps"][0]), bool(rules["disturbed"][0]))
-    route_m = ROUTE_MARGIN_M + route_tube_m(tube_m)
+    margin_m = route_margin_m(scenario)
+    tube_m = tubes_m(
+        scenario, int(rules["lookahead_steps"][0]), bool(rules["disturbed"][0]), margin_m
+    )
+    route_m = margin_m + route_tube_m(tube_m, margin_m)
     obstacles, planes = obstacle_records(scenario, radius_m, overfly_m, route_m)
     measure(obstacles, scenario, float(rules["measured_m"][0]))
     fence = scenario.fence
@@ -304,9 +308,11 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
     )
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
-    rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - ROUTE_MARGIN_M
+    rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - route_margin_m(scenario)
     if scenario.planar is not None:
         rules["floor_m"] = rules["ceiling_m"] = scenario.planar.height_m
+    rules["length_scale"] = length_scale(scenario.vehicles, scenario.dt_s)
+    rules["clock_reserve_s"] = clock_reserve_s(_CLOCK_RESERVE_S, scenario.max_steps * scenario.dt_s)
     rules["brake"]["kind"] = CLIMB
     rules["lookahead_steps"] = lookahead_steps(scenario)
     return rules
@@ -314,5 +320,4 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
 
 def lookahead_steps(scenario: Scenario) -> int:
     """How far guidance and safety filter look ahead: until the slowest to stop has stopped."""
-    slowest_s = max(stopping_of(v, scenario.dt_s).time_s for v in set(scenario.vehicles))
-    return math.ceil(max(_LOOKAHEAD_S, _IN_WIND * slowest_s) / scenario.dt_s)
+    return math.ceil(braking_s(scenario.vehicles, scenario.dt_s) / scenario.dt_s)

@@ -16,12 +16,13 @@ from scipy.sparse.csgraph import dijkstra
 
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.vehicle.scale import length_scale
 from uas_coverage_env.world.obstacles import NODE_MARGIN_M, corners_around
 from uas_coverage_env.world.routes import in_sight
 
 FloatArray = NDArray[np.float64]
 
-_NEARER_M = (0.5, 0.25, 0.1)
+_NEARER_M = (0.5, 0.25, 0.1)  # at scale 1
 
 
 class Corners(NamedTuple):
@@ -62,11 +63,12 @@ def route_corners(
         n_cut_off = _cut_off(planes, level_m, len(scenario.waypoints), first_m, distance_m)
         return n_cut_off, Corners(nodes_m, distance_m)
 
-    fewest, best = at(NODE_MARGIN_M)
+    scale = length_scale(scenario.vehicles, scenario.dt_s)
+    fewest, best = at(scale * NODE_MARGIN_M)
     for margin_m in _NEARER_M:
         if not fewest:
             break
-        n_cut_off, corners = at(margin_m)
+        n_cut_off, corners = at(scale * margin_m)
         if n_cut_off < fewest:
             fewest, best = n_cut_off, corners
     return best

@@ -5,7 +5,8 @@ from uas_coverage_env.entities.outcome import BREACH_TOLERANCE_M
 from uas_coverage_env.world.routes import box_apart
 
 HEIGHT_MARGIN_M = 0.5
-"""Commands stay this much above the least height: altitudes are not held to the centimetre [m]."""
+"""Commands stay this much above the least height, at scale 1: altitudes are not held to the
+centimetre [m]."""
 
 
 @inlined_kernel
@@ -24,7 +25,7 @@ def lowest_altitude(arena, i, x, y):
     rules = arena.rules[0]
     floor_m = rules.floor_m
     if rules.min_height_m > 0.0 and not in_landing_zone(arena, i, x, y):
-        floor_m = max(floor_m, rules.min_height_m + HEIGHT_MARGIN_M)
+        floor_m = max(floor_m, rules.min_height_m + rules.length_scale * HEIGHT_MARGIN_M)
     return floor_m
 
 

@@ -10,17 +10,19 @@ from uas_coverage_env.compiled.memory import record_dtype
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.geometry.polytope import corners_of
 from uas_coverage_env.scenario import NoFlyZone, Scenario
+from uas_coverage_env.vehicle.scale import length_scale
 from uas_coverage_env.world.broad_phase import EPS_M
 from uas_coverage_env.world.overhangs import overhangs
 
 NEAR_M = 20.0
 """Obstacles that are farther need no exact distance, unless nothing is nearer [m]."""
 
-ROUTE_MARGIN_M = 1.0
-"""Routes keep this much more than the clearance that counts as a breach [m]."""
+_ROUTE_MARGIN_M = 1.0
+"""Routes keep this much more than the clearance that counts as a breach, at scale 1 [m]."""
 
 NODE_MARGIN_M = 1.0
-"""Corners of routes lie this much outside of what routes avoid, so that they see past it [m]."""
+"""Corners of routes lie this much outside of what routes avoid, so that they see past it; at scale
+1 [m]."""
 
 _FIELDS = [
     # rows of `normals`: the hull, and the walls of its footprint widened by wall_m
@@ -62,6 +64,13 @@ _FIELDS = [
 OBSTACLE_DTYPE = record_dtype(_FIELDS)
 
 
+def route_margin_m(scenario: Scenario) -> float:
+    """What routes keep beyond the clearance that counts as a breach [m]."""
+    if scenario.route_margin_m is not None:
+        return scenario.route_margin_m
+    return _ROUTE_MARGIN_M * length_scale(scenario.vehicles, scenario.dt_s)
+
+
 def overfly_limit(target_altitudes_m: NDArray[np.float64], ceiling_m: float) -> float:
     """Roofs up to here are flown over: 15 m above the usual target, below the ceiling [m]."""
     return min(float(np.median(target_altitudes_m)) + 15.0, ceiling_m)
@@ -94,6 +103,7 @@ def obstacle_records(
 ]:
     """The obstacles, and the planes of their hulls and footprints."""
     records = np.zeros(len(scenario.obstacles), dtype=OBSTACLE_DTYPE)
+    scale = length_scale(scenario.vehicles, scenario.dt_s)
     ground_m = float(-scenario.fence.vertices_m[:, 2].max())
     planes = []
     first = 0
@@ -101,7 +111,7 @@ def obstacle_records(
         records, scenario.obstacles, scenario.hulls, scenario.kept_hulls, strict=True
     ):
         wall_m = radius_m + obstacle.safe_distance_m + route_m
-        near_m = max(NEAR_M, wall_m + 2 * NODE_MARGIN_M)
+        near_m = max(NEAR_M, wall_m + 2 * NODE_MARGIN_M * scale)
         widened_m = _widened(kept, wall_m)
         footprint = _footprint(widened_m)
         sides = np.column_stack([footprint.equations[:, :2], np.zeros(len(footprint.equations))])
@@ -134,7 +144,7 @@ def obstacle_records(
         record["roof_m"] = -widened_m[:, 2].min()
         record["tall"] = record["roof_m"] > overfly_m
         record["top_m"] = record["roof_m"] - route_m
-        record["overhangs"] = overhangs(hull, ground_m)
+        record["overhangs"] = overhangs(hull, ground_m, scale)
         record["no_fly_zone"] = isinstance(obstacle, NoFlyZone)
     return records, planes
 

@@ -14,17 +14,18 @@ _ON_FACE_M = 1e-3
 _ABOVE_ROOF_M = 0.1
 
 
-def overhangs(hull: ConvexPolytope, ground_m: float) -> bool:
-    """Whether a face looks down from more than half a metre above the lowest altitude.
+def overhangs(hull: ConvexPolytope, ground_m: float, scale: float) -> bool:
+    """Whether a face looks down from more than half a metre above the lowest altitude, at scale 1.
 
     Args:
         hull: The hull of an obstacle.
         ground_m: The lowest altitude [m].
+        scale: Of lengths, see `vehicle.scale`.
     """
     looks_down = hull.normals[:, 2] > _UPRIGHT
     on_face = np.abs(hull.face_distances(hull.vertices_m)[:, looks_down]) < _ON_FACE_M
     altitudes_m = np.where(on_face, -hull.vertices_m[:, 2:], -math.inf)
-    return bool((altitudes_m > ground_m + _ROOM_BELOW_M).any())
+    return bool((altitudes_m > ground_m + scale * _ROOM_BELOW_M).any())
 
 
 @kernel

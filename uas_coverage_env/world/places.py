@@ -5,7 +5,8 @@ from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.world.routes import CREEP_M, box_apart
 
 _ROUTES_INSIDE_M = 0.5
-"""Routes that set out from a given place keep so much more of the fence than is a breach [m]."""
+"""Routes that set out from a given place keep so much more of the fence than is a breach, at scale
+1 [m]."""
 
 
 @inlined_kernel
@@ -33,7 +34,7 @@ def may_be_at(arena, i, x, y, z, start_m=None):
     inside_m = rules.fence_margin_m
     if start_m is not None:
         start_inside_m = inside_fence_m(arena, start_m[0], start_m[1], start_m[2])
-        inside_m = min(inside_m + _ROUTES_INSIDE_M, start_inside_m)
+        inside_m = min(inside_m + rules.length_scale * _ROUTES_INSIDE_M, start_inside_m)
     if inside_fence_m(arena, x, y, z) < inside_m:
         return False
     for o in range(arena.obstacles.shape[0]):

@@ -33,7 +33,7 @@ def _homewards(uas, rules, x, speed_mps, values):
     length_m = math.hypot(dx, dy) + 1e-9
     values[0], values[1] = speed_mps * dx / length_m, speed_mps * dy / length_m
     glide_m = -uas.home_m[2] + uas.descent_mps * max(way_m / uas.speed_mps - _GLIDE_S, 0.0)
-    values[2] = min(glide_m, max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M))
+    values[2] = min(glide_m, max(-x[S.Z], rules.floor_m + rules.length_scale * CRUISE_ALTITUDE_M))
     next_m = math.hypot(
         uas.home_m[0] - x[S.X] - rules.dt_s * x[S.VX], uas.home_m[1] - x[S.Y] - rules.dt_s * x[S.VY]
     )

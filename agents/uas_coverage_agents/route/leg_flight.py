@@ -281,7 +281,7 @@ def over_roofs(arena, x, end_x, end_y, end_altitude_m, uas, leg):
         )
         if at > 1.0 or not passes_over(obstacle, over, ends, leg, max(altitude_m, end_altitude_m)):
             continue
-        needed_m = max(needed_m, obstacle.roof_m + HEADROOM_M)
+        needed_m = max(needed_m, obstacle.roof_m + arena.rules[0].length_scale * HEADROOM_M)
         rise_m = obstacle.roof_m - altitude_m
         if rise_m > 0.0:
             speed_mps = min(speed_mps, at * length_m / (rise_m / uas.climb_mps + LEAD_S))

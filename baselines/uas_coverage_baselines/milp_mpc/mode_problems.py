@@ -22,6 +22,7 @@ from uas_coverage_baselines.milp_mpc.return_rule import ReturnRule
 from uas_coverage_env.entities.commands import HOME, Mode
 from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.scale import length_scale
 from uas_coverage_env.world import SwarmState
 
 _FARTHEST = 4.0  # horizons of cruising: with a metre's cost as low as this a UAS still sets off
@@ -38,7 +39,12 @@ class ModeProblems:
 
     def __init__(self, brief: MissionBrief, options: ModeOptions, ways: Ways | None = None) -> None:
         self._options, self._weights = options, options.weights
-        self._choice = TargetChoice(among_candidates=options.target_scale == "candidates")
+        self._scale = length_scale(brief.vehicles, brief.dt_s)
+        self._choice = TargetChoice(
+            distance_scale_m=self._scale * TargetChoice.distance_scale_m,
+            height_scale_m=self._scale * TargetChoice.height_scale_m,
+            among_candidates=options.target_scale == "candidates",
+        )
         self._builder, self._leads = ProblemBuilder(brief, options, ways), ways is not None
         self.blocked: set[int] = set()
         self._planless: dict[str, int] = {}  # the nearest open waypoint of UAS without any plan
@@ -121,6 +127,7 @@ class ModeProblems:
                     self._builder.horizon_m(name) if level else 0.0,
                     self._weights,
                     _FARTHEST * self._builder.horizon_m(name) if self._leads else np.inf,
+                    self._scale,
                 ),
             )
             for name, now in zip(swarm.active, situations, strict=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.problem import Target, Weights
 
 FloatArray = NDArray[np.float64]
-_NEAR_M = 5.0  # distances below this no longer raise the normalised target cost
+_NEAR_M = 5.0  # at scale 1: distances below this no longer raise the normalised target cost
 _NOTHING_LEFT = 4.0  # times the plain return weight, where nothing is left to cover
 
 
@@ -189,6 +189,7 @@ def target_of(
     alike_m: float,
     weights: Weights,
     farthest_m: float = np.inf,
+    scale: float = 1.0,
 ) -> Target | None:
     """The target distance dynamics of one UAS (eq. (OCP_7)), None in covering mode.
 
@@ -210,13 +211,16 @@ def target_of(
         weights: cost coefficients.
         farthest_m: distances from this one on no longer lower the cost of a metre: were it less,
             a UAS would save the energy, and stay.
+        scale: of lengths, see `vehicle.scale`: in a tenth of the space, a metre costs as much as
+            ten.
     """
+    near_m = scale * _NEAR_M
     if memory.mode is Mode.TRANSIT and memory.waypoint is not None:
         position = waypoints_m[memory.waypoint]
-        distance = max(float(np.linalg.norm(position - now.position_m)), _NEAR_M)
+        distance = max(float(np.linalg.norm(position - now.position_m)), near_m)
         return Target(position, weights.transit / min(distance, farthest_m), memory.waypoint)
     if memory.mode is Mode.RETURN:
-        nearest = max(alike_m, _NEAR_M) if now.plans_coverage and now.uncovered.any() else _NEAR_M
+        nearest = max(alike_m, near_m) if now.plans_coverage and now.uncovered.any() else near_m
         distance = max(float(np.linalg.norm(home_m - now.position_m)), nearest)
         urgency = min(seconds_home / max(seconds_left, 1e-9), 0.98)
         growth = urgency / (1.0 - urgency)
@@ -225,6 +229,6 @@ def target_of(
         elif now.beyond.issuperset(np.flatnonzero(now.uncovered).tolist()):
             growth = max(growth, _NOTHING_LEFT)
         weight = weights.return_home * growth / min(distance, max(farthest_m, nearest))
-        weight = min(weight, weights.home_per_m_max)
+        weight = min(weight, weights.home_per_m_max / scale)
         return Target(home_m, weight)
     return None

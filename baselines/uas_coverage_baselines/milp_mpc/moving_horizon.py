@@ -10,6 +10,7 @@ from typing import Generic, Self, TypeVar
 
 import numpy as np
 
+from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
@@ -31,9 +32,10 @@ from uas_coverage_env.mission.attempts import Attempts
 from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.planning.around.handover import away_of
 from uas_coverage_env.planning.following import Following
+from uas_coverage_env.vehicle.scale import length_scale
 from uas_coverage_env.world import Command, SwarmState
 
-_CAREFUL_WITHIN_M = 40.0  # of home a UAS that does not come nearer to it flies slowly
+_CAREFUL_WITHIN_M = 40.0  # at scale 1: of home a UAS that does not come nearer to it flies slowly
 
 Chosen = TypeVar("Chosen", bound=MovingHorizonOptions)
 
@@ -110,10 +112,12 @@ class MovingHorizon(ABC, Generic[Chosen]):
             self._steering = along_order(brief, seed)
         self.last_plan = self.plan = self._backup = None
         self._round_robin = RoundRobin()
-        self._follower = RouteFollower(brief, self.options.margin_m, self.blocks)
+        margins = margins_in(brief, self.options.margin_m, self.options.moving_margin_m)
+        self._near_home_m = length_scale(brief.vehicles, brief.dt_s) * _CAREFUL_WITHIN_M
+        self._follower = RouteFollower(brief, margins.fixed_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
         self._attempts = Attempts(brief)
-        self._silent_uas = SilentUas(brief, self.options.moving_margin_m)
+        self._silent_uas = SilentUas(brief, margins.moving_m)
         self._called = set[str]()  # UAS whose plans have left no charge but for the way home
         self.last_decision = None
 
@@ -198,7 +202,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def _is_near_home(self, problem: PlanningProblem, uas: int) -> bool:
         away_m = problem.x0[uas, :2] - problem.home_m[uas, :2]
-        return float(np.hypot(*away_m)) < _CAREFUL_WITHIN_M
+        return float(np.hypot(*away_m)) < self._near_home_m
 
     def _effort(self) -> Effort:
         return Effort(

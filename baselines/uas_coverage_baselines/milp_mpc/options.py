@@ -55,8 +55,8 @@ class OcpOptions(PlannerOptions):
     horizon: int = Field(default=18, ge=8, le=60, description="N, steps of the prediction")
     obstacle_sides: int = Field(default=8, ge=4, le=32, multiple_of=2, description="H_O")
     waypoint_sides: int = Field(default=4, ge=4, le=16, multiple_of=4, description="H_WP")
-    margin_m: MarginM = 0.3
-    moving_margin_m: MovingMarginM = 3.0
+    margin_m: MarginM = None
+    moving_margin_m: MovingMarginM = None
     in_wind: Literal["guidance", "wrenches"] = Field(
         default="guidance",
         description="how to fly where bounds of wind or vehicles are stated: along the order by "

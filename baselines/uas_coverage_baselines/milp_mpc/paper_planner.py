@@ -72,8 +72,8 @@ class PaperOptions(ModeOptions):
         description="c_in of speed, tilt and tilt rate: cos(pi / H_P), or 1, up to "
         "1 / cos(pi / H_P) beyond the limits, which the world calls violations",
     )
-    margin_m: float = with_default(ModeOptions, "margin_m", _ROUNDING_M)
-    moving_margin_m: float = with_default(ModeOptions, "moving_margin_m", _ROUNDING_M)
+    margin_m: float | None = with_default(ModeOptions, "margin_m", _ROUNDING_M)
+    moving_margin_m: float | None = with_default(ModeOptions, "moving_margin_m", _ROUNDING_M)
     corner_cutting: Literal["fixed", "all"] = Field(
         default="fixed",
         description="what has these rows: fixed obstacles, or also moving ones and pairs of UAS",

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
     seconds_onward,
     straight_seconds_home,
@@ -26,10 +27,10 @@ from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.mission import MissionBrief, Ways, WorldView
 from uas_coverage_env.mission.ways import Way
-from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import VehicleParams, linear_model
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import dod_per_s
+from uas_coverage_env.vehicle.scale import braking_s
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -47,6 +48,7 @@ class ProblemBuilder:
 
     def __init__(self, brief: MissionBrief, options: OcpOptions, ways: Ways | None = None) -> None:
         self._ways = ways
+        self._margins = margins_in(brief, options.margin_m, options.moving_margin_m)
         self.brief, self._options, self._form = brief, options, options.form
         self._view = WorldView(brief)
         self.dt_s = brief.dt_s
@@ -173,7 +175,7 @@ class ProblemBuilder:
     ) -> PlanningProblem:
         """What is seen now, about the given waypoints, which are the scenario's rows."""
         options, names = self._options, swarm.active
-        margin_m = min(options.margin_m, 0.1)
+        margin_m = min(self._margins.fixed_m, 0.1)
         # in the plane, heights are checked when the file is read
         least_m = self.brief.min_height_m if self.brief.planar is None else 0.0
         order = self._form.get("order", PlanningProblem.order)
@@ -201,11 +203,11 @@ class ProblemBuilder:
             fence=self._fence,
             fence_margin_m=self.brief.geofence.margin_m + margin_m,
             obstacles=tuple(self._obstacles[o] for o in obstacles),
-            obstacle_clearance_m=radius[:, None] + fixed + options.margin_m,
+            obstacle_clearance_m=radius[:, None] + fixed + self._margins.fixed_m,
             moving=self._predicted(swarm),
-            moving_clearance_m=radius[:, None] + moving + options.moving_margin_m,
+            moving_clearance_m=radius[:, None] + moving + self._margins.moving_m,
             separation_m=(
-                radius[:, None] + radius + self.brief.uas_safe_distance_m + options.margin_m
+                radius[:, None] + radius + self.brief.uas_safe_distance_m + self._margins.fixed_m
             ),
             waypoints_m=self.waypoints_m[waypoints],
             waypoint_reach_m=self._waypoint_reach_m[waypoints],
@@ -231,12 +233,12 @@ class ProblemBuilder:
         """
         if not self._form.get("prune", PlanningProblem.prune):
             return list(range(len(self.brief.obstacles)))
-        near_m = max(u.radius_m for u in self.brief.uas) + self._options.margin_m
+        near_m = max(u.radius_m for u in self.brief.uas) + self._margins.fixed_m
         result = []
         rows = [swarm.names.index(name) for name in swarm.active]
         speed = [self._vehicles[name].limits.v_xy_max_mps for name in swarm.active]
         # at most: the corners of the speed's polygon, and what a UAS flies while it brakes
-        way_m = 1.1 * np.array(speed) * (self.horizon_s + BRAKING_S)
+        way_m = 1.1 * np.array(speed) * (self.horizon_s + braking_s(self.brief.vehicles, self.dt_s))
         for o, (obstacle, (_, hull)) in enumerate(
             zip(self.brief.obstacles, self._obstacles, strict=True)
         ):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import SETTLING_S
+from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import settling_s
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.vehicle.params import return_threshold
@@ -33,6 +33,7 @@ class ReturnRule:
         self._detour, self._ways = detour, ways
         self._row = {uas.name: row for row, uas in enumerate(brief.uas)}
         self._vehicles = brief.vehicles
+        self._settling_s = [settling_s(vehicle, brief.dt_s) for vehicle in brief.vehicles]
         self._speeds = [speeds_of(vehicle) for vehicle in brief.vehicles]
         self._dod_max = np.array([uas.dod_max for uas in brief.uas])
         self._dod_per_s = np.array(
@@ -52,7 +53,8 @@ class ReturnRule:
         """What is kept back, in a few words."""
         if self._detour is None:
             return "the vehicle file's return_rule"
-        return f"{self._detour:g} times the way to a waypoint and home, and {SETTLING_S:g} s"
+        settling_s = max(self._settling_s)
+        return f"{self._detour:g} times the way to a waypoint and home, and {settling_s:g} s"
 
     def dod_return(self, name: str, position_m: FloatArray, uncovered: BoolArray) -> float:
         """DoD_r of a UAS.
@@ -94,7 +96,7 @@ class ReturnRule:
     def _dod_before(self, uas: int, seconds: float) -> float:
         """The depth of discharge at which so long a flight home is due."""
         assert self._detour is not None
-        due_s = self._detour * seconds + SETTLING_S
+        due_s = self._detour * seconds + self._settling_s[uas]
         return float(self._dod_max[uas] - self._dod_per_s[uas] * due_s)
 
     def _least_s(self, uas: int, position_m: FloatArray, waypoints: NDArray[np.intp]) -> float:

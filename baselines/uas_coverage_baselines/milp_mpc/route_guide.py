@@ -22,6 +22,7 @@ from uas_coverage_env.planning.routing import (
 )
 from uas_coverage_env.planning.routing.legs import Legs
 from uas_coverage_env.planning.routing.window import RouteWindow
+from uas_coverage_env.vehicle.scale import length_scale
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -33,7 +34,7 @@ _SEARCHED_AGAIN = 60  # waypoints of each route, at most, at every decision
 _WORTH_CHANGING_S = 0.5
 _WAIT_WHEN_LEFT_S = 60.0  # with less than this still to go, blocked waypoints are waited for
 _WAIT_S = 30.0  # how long is then expected
-_WAITING_M = 100.0  # how far from a blocked waypoint is near enough: what blocks it may set off
+_WAITING_M = 100.0  # of a blocked waypoint is near enough, at scale 1: what blocks may set off
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ class RouteGuide:
         self._legs = Legs(brief)
         self._names = tuple(uas.name for uas in brief.uas)
         self._radius_m = np.array([w.radius_m for w in brief.waypoints])
+        self._waiting_m = length_scale(brief.vehicles, brief.dt_s) * _WAITING_M
         self._order: Routes | None = None
         self.blocked: set[int] = set()
         self._waits = False  # whether blocked waypoints are waited for, once little else is left
@@ -151,7 +153,7 @@ class RouteGuide:
             wanted = swarm.uncovered
         opens[blocked] = _WAIT_S
         self._near_enough_m = 0.5 * self._radius_m
-        self._near_enough_m[blocked] = _WAITING_M
+        self._near_enough_m[blocked] = self._waiting_m
         return RoutingProblem.seen(
             self._brief,
             swarm,

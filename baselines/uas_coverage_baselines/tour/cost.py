@@ -31,7 +31,7 @@ SLOWER = 1.15
 _UNFLYABLE_S = 1e6
 _PEER_S = 30.0  # cost of coming too near to another UAS, for each step
 _MOVING_S_PER_M = 5.0  # cost of coming too near to a moving obstacle
-_MARGIN_M = 0.3  # beyond the distances that count as a breach
+_MARGIN_M = 0.3  # beyond the distances that count as a breach, at scale 1
 _PEER_MARGIN_M = 1.5
 _PEER_STEPS = 10  # as long as the plans of others are believed
 _EXACT_STEPS = 6  # of which braking is simulated as the safety filter does; then estimated
@@ -59,21 +59,22 @@ class Around(NamedTuple):
 def distances_kept(arena, i, x, others_m):
     """What is kept from obstacles, fence and ground: less where there is less already."""
     normals, offsets_m, rules = arena.normals, arena.offsets_m, arena.rules[0]
+    margin_m = rules.length_scale * _MARGIN_M
     keep_m = np.empty(arena.obstacles.shape[0])
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
         now_m = signed_distance(
             normals, offsets_m, obstacle.first_kept, obstacle.last_kept, x[S.X], x[S.Y], x[S.Z]
         )
-        keep_m[o] = min(arena.uas[i].radius_m + obstacle.safe_distance_m + _MARGIN_M, now_m - 1e-3)
+        keep_m[o] = min(arena.uas[i].radius_m + obstacle.safe_distance_m + margin_m, now_m - 1e-3)
     fence_m = np.empty(rules.fence_last - rules.fence_first)
     for h in range(len(fence_m)):
         face = rules.fence_first + h
         now_m = -signed_distance(normals, offsets_m, face, face + 1, x[S.X], x[S.Y], x[S.Z])
-        fence_m[h] = min(rules.fence_margin_m + 0.5 * _MARGIN_M, now_m - 1e-3)
+        fence_m[h] = min(rules.fence_margin_m + 0.5 * margin_m, now_m - 1e-3)
     height_m = -math.inf
     if rules.min_height_m > 0.0:
-        height_m = rules.min_height_m + 0.5 * _MARGIN_M
+        height_m = rules.min_height_m + 0.5 * margin_m
         if not in_landing_zone(arena, i, x[S.X], x[S.Y]):
             height_m = min(height_m, -x[S.Z] - 1e-3)
     path_m = np.empty((rules.lookahead_steps + 1, 3))
@@ -151,7 +152,8 @@ def surroundings_cost(arena, i, task, plan, n_flown, others_m):
         if j == i or math.isnan(others_m[j, 0, 0]):
             continue
         keep_m = arena.uas[i].radius_m + arena.uas[j].radius_m
-        keep_m += arena.rules[0].uas_safe_distance_m + _PEER_MARGIN_M
+        keep_m += arena.rules[0].uas_safe_distance_m
+        keep_m += arena.rules[0].length_scale * _PEER_MARGIN_M
         for k in range(min(n_flown, _PEER_STEPS)):
             a, b, c, d = plan.path_m[k], plan.path_m[k + 1], others_m[j, k], others_m[j, k + 1]
             apart_m = cylinder_clearance(

@@ -211,7 +211,9 @@ def _pursue(arena, i, task, plan, k):
         speed_mps = min(speed_mps, math.sqrt(task.acceleration_mps2 * left_m), 0.5 * left_m)
         if target == HOME_TARGET:
             altitude_m += uas.descent_mps * max(way_m / uas.speed_mps - 1.0, 0.0)
-            altitude_m = min(altitude_m, max(-x[S.Z], rules.floor_m + CRUISE_ALTITUDE_M))
+            altitude_m = min(
+                altitude_m, max(-x[S.Z], rules.floor_m + rules.length_scale * CRUISE_ALTITUDE_M)
+            )
     if kind != CLEAR:
         needed_m, slow_mps = _roofs_ahead(arena, i, x, end_x, end_y)
         altitude_m = max(altitude_m, needed_m)

@@ -23,6 +23,7 @@ from uas_coverage_env.planning.decision import Decision
 from uas_coverage_env.planning.following import Following
 from uas_coverage_env.planning.routing import Routes, SearchEffort
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.scale import length_scale
 from uas_coverage_env.world import Arena, Command, GoTo, SwarmState, Velocity
 
 FloatArray = NDArray[np.float64]
@@ -31,13 +32,12 @@ _STEPS_AT_MOST = 60
 _COVERED_WITHIN_M = 0.3  # nearer than the radius by this, or by a fiftieth of it
 _NEAR = 0.7  # share of the radius at which the leg to a waypoint is expected to end
 _FROM_WITHIN = 0.8  # share of the radius from within which a waypoint is covered, beside what moves
-_WAITING_M = 100.0  # how far from a blocked waypoint to wait: what blocks it may set off
+_WAITING_M = 100.0  # of a blocked waypoint to wait within, at scale 1: what blocks may set off
 _PER_WAYPOINT_S = 5.0  # what a turn takes beyond that: there is no gain in putting one off
-_MOVING_MARGIN_M = 6.0
+_MOVING_MARGIN_M = 6.0  # at scale 1
 _SURPRISE_MPS = 0.3  # a larger deviation means that another flew: the filter, return mode
 _OFF_MPS = 0.6  # a mean deviation with which no plan comes true
 _OFF_SHARE = 0.1  # of the last step in that mean
-_BLOCKED_FROM = (_FROM_WITHIN, _FROM_WITHIN, _MOVING_MARGIN_M)
 
 
 class Leader(Protocol):
@@ -90,7 +90,10 @@ class TourFlight:
         goes_on: bool = False,
     ) -> None:
         self._brief, self._changes, self._seed = brief, changes, seed
-        self._following = Following(brief, blocked_from=_BLOCKED_FROM)
+        self._scale = length_scale(brief.vehicles, brief.dt_s)
+        self._following = Following(
+            brief, blocked_from=(_FROM_WITHIN, _FROM_WITHIN, self._scale * _MOVING_MARGIN_M)
+        )
         self._world, self._guided = self._following.view, self._following.guided
         self._recall = self._following.recall
         self._arena = self._world.arena
@@ -207,11 +210,11 @@ class TourFlight:
         return PursuitTask(
             np.ascontiguousarray(route),
             np.where(_closed(view)[route], -1.0, within_m),
-            np.append(np.where(blocked, _WAITING_M, _NEAR * radius_m), 0.0),
+            np.append(np.where(blocked, self._scale * _WAITING_M, _NEAR * radius_m), 0.0),
             schedule.rest_s(i, SLOWER, _PER_WAYPOINT_S) if len(route) else np.zeros(1),
             schedule.legs.acceleration_mps2[i],
             self._brake_s[i],
-            _MOVING_MARGIN_M,
+            self._scale * _MOVING_MARGIN_M,
         )
 
     def _catch_up(self, i: int, x: FloatArray, route: NDArray[np.int64], swarm: SwarmState) -> int:

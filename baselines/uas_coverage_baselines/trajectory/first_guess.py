@@ -21,9 +21,11 @@ _SLOWER = (1.0, 0.85, 0.7, 0.5)
 _WAITS_S = (6.0, 12.0, 20.0)
 _CLIMB, _DESCENT = 0.83, 0.87
 _SET_OFF_S, _SETTLE_S = 3.0, 4.0
-_DENSE_M = 4.0
+_DENSE_M = 4.0  # at scale 1, as the next two
 _OVER_M = 0.5
+_BESIDE_M = 0.5
 _STOPPING_S = 2.5
+_DEEPER_M = 0.5  # at scale 1
 _MENDS = 3
 
 
@@ -114,7 +116,10 @@ def deepest_visits(program: FlightProgram, flight: PlannedFlight, route: IntArra
             flight.path_m[low : high + 1] - program.waypoints_m[waypoint], axis=1
         )
         best = int(np.argmin(away_m))
-        if low <= visits[k] <= high and away_m[best] < away_m[visits[k] - low] - 0.5:
+        if (
+            low <= visits[k] <= high
+            and away_m[best] < away_m[visits[k] - low] - program.space.length_scale * _DEEPER_M
+        ):
             visits[k] = low + best
     return visits
 
@@ -172,7 +177,7 @@ def _timed(
     left, and reached, straight up and down where they must be; so are marks that the path would
     pass more than `deep_m` (K,) too high.
     """
-    dense, first = _dense(corners)
+    dense, first = _dense(corners, space)
     top_m = _needed_m(dense, space)
     step_m = np.hypot(*np.diff(dense[:, :2], axis=0).T)
     for n in range(len(top_m) - 2, -1, -1):
@@ -199,10 +204,11 @@ def _timed(
     return path_m, np.concatenate([[0.0], np.cumsum(seconds)]), at + 1
 
 
-def _dense(corners: FloatArray) -> tuple[FloatArray, IntArray]:
+def _dense(corners: FloatArray, space: Space) -> tuple[FloatArray, IntArray]:
     """Places a few metres apart along corners, and at which of them each corner is."""
     away = np.diff(corners, axis=0)
-    pieces = np.maximum((np.hypot(away[:, 0], away[:, 1]) / _DENSE_M).astype(np.int64), 1)
+    dense_m = space.length_scale * _DENSE_M
+    pieces = np.maximum((np.hypot(away[:, 0], away[:, 1]) / dense_m).astype(np.int64), 1)
     parts = [
         p + np.linspace(0.0, 1.0, k, endpoint=False)[:, None] * step
         for p, step, k in zip(corners[:-1], away, pieces, strict=True)
@@ -212,7 +218,7 @@ def _dense(corners: FloatArray) -> tuple[FloatArray, IntArray]:
 
 def _way_s(corners: FloatArray, space: Space, speeds: Speeds) -> float:
     """Flight time along corners; what has to be climbed over takes as long as it takes."""
-    dense, _ = _dense(corners)
+    dense, _ = _dense(corners, space)
     length_m = np.hypot(*np.diff(corners[:, :2], axis=0).T)
     top_m = _needed_m(dense, space).max()
     first_m, last_m = -corners[0, 2], -corners[-1, 2]
@@ -222,10 +228,10 @@ def _way_s(corners: FloatArray, space: Space, speeds: Speeds) -> float:
 
 def _needed_m(path_m: FloatArray, space: Space) -> FloatArray:
     """(N+1,) altitudes at which a path passes over what it meets, where it can."""
-    top_m = -path_m[:, 2].copy()
+    top_m, over_m = -path_m[:, 2].copy(), space.length_scale * _OVER_M
     if space.least_height_m > 0.0:
         outside = ~space.is_in_zone(path_m)
-        top_m[outside] = np.maximum(top_m[outside], space.planned_height_m + _OVER_M)
+        top_m[outside] = np.maximum(top_m[outside], space.planned_height_m + over_m)
     outside_m = path_m @ space.fence_normals.T + space.fence_offsets_m
     up = -space.fence_normals[:, 2]
     room_m = np.where(up > 0.1, -outside_m / np.maximum(up, 0.1), np.inf).min(axis=1)
@@ -242,12 +248,14 @@ def _needed_m(path_m: FloatArray, space: Space) -> FloatArray:
         walls = np.abs(normals[:, 2]) < 0.7
         beside_m = path_m[rows] @ normals[walls].T + offsets_m[walls]
         inside = np.zeros(len(path_m), bool)
-        inside[rows] = beside_m.max(axis=1, initial=-np.inf) < keep_m - 0.5
-        over_m = -space.low_m[o, 2] + keep_m + _OVER_M
+        inside[rows] = (
+            beside_m.max(axis=1, initial=-np.inf) < keep_m - space.length_scale * _BESIDE_M
+        )
+        roof_m = -space.low_m[o, 2] + keep_m + over_m
         inside[1:] |= inside[:-1]
         inside[:-1] |= inside[1:]
-        lifted = inside & (over_m < ceiling_m)
-        top_m[lifted] = np.maximum(top_m[lifted], over_m)
+        lifted = inside & (roof_m < ceiling_m)
+        top_m[lifted] = np.maximum(top_m[lifted], roof_m)
     return top_m
 
 

@@ -35,6 +35,7 @@ from uas_coverage_env.planning.routing import RoutingProblem
 from uas_coverage_env.planning.routing.problem import battery_s
 from uas_coverage_env.planning.routing.terrain import Terrain
 from uas_coverage_env.planning.routing.trips import FreshPacks, Packs
+from uas_coverage_env.vehicle.scale import braking_s, length_scale
 from uas_coverage_env.world import SwarmState
 
 FloatArray = NDArray[np.float64]
@@ -44,7 +45,7 @@ IntArray = NDArray[np.int64]
 _ROOM, _TRACKING_ROOM = 0.03, 0.01  # share of the limits
 _ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
 _TRACKING_ALLOWANCE = Allowance(inside_m=0.25, landing_distance=0.8, landing_speed=0.5)
-_WIDER_M = 0.3  # tracking keeps of obstacles beyond the distance of plans, where it can
+_WIDER_M = 0.3  # tracking keeps of obstacles beyond the distance of plans, where it can; at scale 1
 _LATER_STEPS = 12  # to make way for another
 
 
@@ -79,6 +80,8 @@ class Fleet:
         moving_margin_m: Planned beyond the safe distances from what moves.
 
     Attributes:
+        length_scale: Of the mission, see `vehicle.scale`.
+        braking_s: After which every UAS has braked, likewise [s].
         closed_off: (U, W) waypoints to which a UAS was found to have no flight: not planned again.
     """
 
@@ -91,6 +94,8 @@ class Fleet:
     ) -> None:
         self.brief, self.margin_m, self._speed_share = brief, margin_m, speed_share
         self._moving_margin_m, self._reserve = moving_margin_m, TRAJECTORY
+        self.length_scale = length_scale(brief.vehicles, brief.dt_s)
+        self.braking_s = braking_s(brief.vehicles, brief.dt_s)
         self.terrain, self._packs = Terrain(brief), Packs.of(brief)
         arena = self.terrain.arena
         self.arena = arena
@@ -225,7 +230,9 @@ class Fleet:
         return replace(
             program,
             model=flight_model(self.arena.vehicles[uas], _TRACKING_ROOM),
-            space=program.space._replace(keep_m=program.space.keep_m + _WIDER_M),
+            space=program.space._replace(
+                keep_m=program.space.keep_m + self.length_scale * _WIDER_M
+            ),
             reserve=0.0,
             allowance=_TRACKING_ALLOWANCE,
         )

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.trajectory.course import Course, hover_inputs
 from uas_coverage_baselines.trajectory.fleet import Fleet
 from uas_coverage_baselines.trajectory.mission_plan import is_idle
@@ -25,6 +26,7 @@ from uas_coverage_env.planning.around.repeats import open_now
 from uas_coverage_env.planning.decision import Decision
 from uas_coverage_env.planning.following import Following
 from uas_coverage_env.vehicle import layout as S
+from uas_coverage_env.vehicle.scale import length_scale
 from uas_coverage_env.world import Command, GoTo, SwarmState, Wrench
 
 FloatArray = NDArray[np.float64]
@@ -61,9 +63,11 @@ class MissionFlight:
     ) -> None:
         self._brief, self._seed, self._moves = brief, seed, options.moves
         self._world, way_home = WorldView(brief), Range(brief)
-        moving_m = options.moving_margin_m + PLAN_MARGIN_M
-        self._fleet = Fleet(brief, options.margin_m, options.speed_share, moving_m)
-        self.safeguard = Safeguard(self._fleet, self._world, way_home, options.moving_margin_m)
+        margins = margins_in(brief, options.margin_m, options.moving_margin_m)
+        scale = length_scale(brief.vehicles, brief.dt_s)
+        moving_m = margins.moving_m + scale * PLAN_MARGIN_M
+        self._fleet = Fleet(brief, margins.fixed_m, options.speed_share, moving_m)
+        self.safeguard = Safeguard(self._fleet, self._world, way_home, margins.moving_m)
         self._replanning = Replanning(self._fleet, way_home, options, seed)
         self._tracking = Tracking(self._fleet)
         self._none = np.zeros(len(brief.uas), np.bool_)

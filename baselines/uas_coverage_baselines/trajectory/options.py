@@ -51,8 +51,8 @@ class TrajectoryOptions(PlannerOptions):
         le=1.0,
         description="highest speed flown, as a share of the largest horizontal speed",
     )
-    margin_m: MarginM = 0.3
-    moving_margin_m: MovingMarginM = 3.0
+    margin_m: MarginM = None
+    moving_margin_m: MovingMarginM = None
     threads: int = Field(
         default=2,
         ge=1,

@@ -12,17 +12,16 @@ from uas_coverage_baselines.trajectory.mission_plan import MissionPlan, Planned
 from uas_coverage_baselines.trajectory.moving_obstacles import NEVER, MovingObstacles
 from uas_coverage_baselines.trajectory.waiting import Waiting
 from uas_coverage_env.entities.state import FLYING
-from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.world import SwarmState
 
 BoolArray = NDArray[np.bool_]
 
 PLAN_MARGIN_M = 1.0
-"""Plans keep this much more from what moves than what is flown has to [m]."""
+"""Plans keep this much more from what moves than what is flown has to, at scale 1 [m]."""
 
 _AGAIN_S = 4.0  # a plan that did not come is looked for again after this time
-_SOON_S = BRAKING_S  # a visit to what is still blocked so soon is put off,
-_AT_LAST_S = 8.0  # given up where it cannot be put off
+_AT_LAST_S = 8.0  # a visit to what is still blocked so soon is given up; while the UAS may still
+# brake it is put off where it can be
 
 
 @dataclass
@@ -150,7 +149,7 @@ class PlanInForce:
         if len(moving) != len(self.moving) or moving.has_turned(self.moving):
             return "something moves otherwise"
         later_s = fleet.brief.dt_s * (swarm.step - self.made_at)
-        if waited and moving.off_m(self.moving, later_s) > PLAN_MARGIN_M:
+        if waited and moving.off_m(self.moving, later_s) > fleet.length_scale * PLAN_MARGIN_M:
             return "a UAS without a radio flies otherwise"
         opens = fleet.opens(moving)
         if not np.array_equal((opens > 0) & swarm.uncovered, self.blocked & swarm.uncovered):
@@ -169,7 +168,7 @@ class PlanInForce:
         for planned in self.planned.values():
             visits = planned.flight.visits + planned.course.begin
             at_last = visits >= self.latest_visit[planned.route]
-            soon_s = np.where(at_last, _AT_LAST_S, _SOON_S)
+            soon_s = np.where(at_last, _AT_LAST_S, fleet.braking_s)
             ahead = visits - swarm.step
             near = (fleet.brief.dt_s * ahead < soon_s) & (ahead > 0)
             if (blocked[planned.route] & near).any():

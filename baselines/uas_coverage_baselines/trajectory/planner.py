@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.tour import Tour
 from uas_coverage_baselines.trajectory.in_wind import blows, tour_in_wind
 from uas_coverage_baselines.trajectory.mission_flight import MissionFlight
@@ -51,12 +52,13 @@ class Trajectory:
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Plan the mission from the starts; one that may be under way, when it goes on."""
         flew, effort = self._flies, order_effort(self.options, len(brief.uas))
+        margins = margins_in(brief, self.options.margin_m, self.options.moving_margin_m)
         goes_on, self._has_acted = self._has_acted, False
         if brief.execution is not None:
             self._flies = LegOrder(brief, self.options.orders, effort, seed)
         elif blows(brief):
             if not isinstance(flew, Tour) or flew.effort != effort:
-                self._flies = flew = tour_in_wind(effort, self.options.margin_m)
+                self._flies = flew = tour_in_wind(effort, margins.fixed_m)
             flew.reset(brief, seed)
         elif not goes_on:
             self._flies = MissionFlight(brief, self.options, seed)

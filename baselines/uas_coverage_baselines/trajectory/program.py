@@ -33,6 +33,7 @@ IntArray = NDArray[np.int64]
 TOLERANCE_M = 0.02
 """Soft rows that are violated by less in sum count as kept: margins are larger than this."""
 
+# lengths at scale 1
 _NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
 _FENCE_NEAR_M = 25.0
 _SMALL_M = 2.5  # spheres with a smaller radius are visited less far inside
@@ -303,12 +304,18 @@ class FlightProgram:
             most_mps = np.full(len(stages), self.air.speed_mps)
             made.append(_balls(stages, VELOCITY, wind_mps, most_mps, _AIRSPEED_WEIGHT))
         if len(self.space.keep_m):
-            stage, normal, bound = separating_rows(self.space, path_m, _NEAR_M)
+            stage, normal, bound = separating_rows(
+                self.space, path_m, self.space.length_scale * _NEAR_M
+            )
             made.append(_planes(stage, normal, bound))
         if self.space.least_height_m > 0.0:
             made.append(_planes(*height_rows(self.space, path_m)))
         made += self._fence_rows(path_m)
-        made += [rows for body in self.bodies if (rows := _apart(body, path_m)) is not None]
+        made += [
+            rows
+            for body in self.bodies
+            if (rows := _apart(body, path_m, self.space.length_scale * _NEAR_M)) is not None
+        ]
         # joined, copies of one row are stored by columns: a layout that kernels are compiled for
         return SoftRows(*(np.ascontiguousarray(np.concatenate(p)) for p in zip(*made, strict=True)))
 
@@ -317,7 +324,7 @@ class FlightProgram:
         outside_m = path_m @ space.fence_normals.T + space.fence_offsets_m
         result = []
         for h in range(len(space.fence_offsets_m)):
-            stage = np.flatnonzero(outside_m[1:-1, h] > -_FENCE_NEAR_M) + 1
+            stage = np.flatnonzero(outside_m[1:-1, h] > -space.length_scale * _FENCE_NEAR_M) + 1
             if not len(stage):
                 continue
             # homes may lie in the margin
@@ -367,15 +374,15 @@ def _planes(stage: IntArray, normal: FloatArray, bound: FloatArray) -> SoftRows:
     return SoftRows(stage, np.zeros(m, bool), rows, normal, bound, np.full(m, _CLEAR_WEIGHT))
 
 
-def _apart(body: Body, path_m: FloatArray) -> SoftRows | None:
-    """Rows that keep clear of a body: a plane for each step, at both of its ends."""
+def _apart(body: Body, path_m: FloatArray, near_m: float) -> SoftRows | None:
+    """Rows that keep clear of a body that is near: a plane for each step, at both of its ends."""
     n = min(len(path_m), len(body.path_m))
     if n < 2:
         return None
     away = path_m[:n] - body.path_m[:n]
     level_m = np.hypot(away[:, 0], away[:, 1])
     beside, above = level_m - body.level_m, np.abs(away[:, 2]) - body.height_m
-    near = np.flatnonzero(np.maximum(beside, above)[1:] < _NEAR_M) + 1
+    near = np.flatnonzero(np.maximum(beside, above)[1:] < near_m) + 1
     if not len(near):
         return None
     face = np.zeros((n, 3))

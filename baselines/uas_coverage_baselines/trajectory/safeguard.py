@@ -83,7 +83,7 @@ class Safeguard:
     ) -> None:
         self._fleet, self._world = fleet, world
         self._margin_m, self._way_home = moving_margin_m, way_home
-        self._supervisor = Supervisor(fleet.arena.vehicles, fleet.brief.dt_s)
+        self._supervisor = Supervisor(fleet.arena.vehicles, fleet.brief.dt_s, fleet.braking_s)
 
     @property
     def backups(self) -> dict[int, Course]:

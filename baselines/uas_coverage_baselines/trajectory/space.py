@@ -23,6 +23,7 @@ TALL_M = 1e9
 """Of what nothing passes over or under in a plane [m]."""
 
 _BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it
+# at scale 1
 _FENCE_MARGIN_M = 0.1
 _HEIGHT_MARGIN_M = 0.1
 _ZONE_SIDES = 8
@@ -53,6 +54,8 @@ class Space(NamedTuple):
     """(H,) a place is inside, with margin, where `normal . p + offset <= 0`."""
     fence_margin_m: float
     """Of the plan, in addition to that of the rules."""
+    length_scale: float
+    """See `vehicle.scale`."""
     least_height_m: float
     """Above the ground, outside of the landing zone; 0: no such rule."""
     zone_middle_m: FloatArray
@@ -63,7 +66,11 @@ class Space(NamedTuple):
     @property
     def planned_height_m(self) -> float:
         """The least height that is planned outside of the landing zone."""
-        return self.least_height_m + _HEIGHT_MARGIN_M if self.least_height_m > 0.0 else 0.0
+        return (
+            self.least_height_m + self.length_scale * _HEIGHT_MARGIN_M
+            if self.least_height_m > 0.0
+            else 0.0
+        )
 
     def is_in_zone(self, path_m: FloatArray) -> NDArray[np.bool_]:
         """(N,) whether places (N, 3) lie in the landing zone."""
@@ -119,7 +126,8 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         least_m=least_m,
         fence_normals=np.ascontiguousarray(arena.normals[fence]),
         fence_offsets_m=arena.offsets_m[fence] + float(rules["fence_margin_m"]),
-        fence_margin_m=_FENCE_MARGIN_M,
+        fence_margin_m=min(_FENCE_MARGIN_M, margin_m),
+        length_scale=float(rules["length_scale"]),
         least_height_m=height_m,
         zone_middle_m=np.array(arena.uas[uas]["home_m"][:2], float),
         zone_m=float(rules["landing_zone_m"]),
@@ -138,11 +146,11 @@ def height_rows(space: Space, path_m: FloatArray) -> tuple[IntArray, FloatArray,
     """
     stages = np.arange(1, max(len(path_m) - 1, 1))
     low = space.is_in_zone(path_m[stages])
-    low &= -path_m[stages, 2] < space.planned_height_m + _MAY_SINK_M
+    low &= -path_m[stages, 2] < space.planned_height_m + space.length_scale * _MAY_SINK_M
     high = stages[~low]
     angle = 2.0 * np.pi / _ZONE_SIDES * np.arange(_ZONE_SIDES)
     sides = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_ZONE_SIDES)])
-    within_m = (space.zone_m - _ZONE_MARGIN_M) * np.cos(np.pi / _ZONE_SIDES)
+    within_m = (space.zone_m - space.length_scale * _ZONE_MARGIN_M) * np.cos(np.pi / _ZONE_SIDES)
     side_bounds = within_m + sides[:, :2] @ space.zone_middle_m
     return (
         np.concatenate([high, np.repeat(stages[low], _ZONE_SIDES)]),

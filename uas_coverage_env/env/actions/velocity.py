@@ -13,9 +13,10 @@ from uas_coverage_env.env.actions.landing import (
 )
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import VehicleParams
+from uas_coverage_env.vehicle.scale import length_scale
 
 ALTITUDE_MARGIN_M = 1.0
-"""Altitudes of the velocity action keep this much more than the fence's margin [m]."""
+"""Altitudes of the velocity action keep this much more than the fence's margin, at scale 1 [m]."""
 
 SLOPE_AT_REST = 0.1
 """Of v1: a share s of the limit is s · (this + (1 - this) · s²). Noise of an action near 0 is ten
@@ -31,7 +32,8 @@ def _altitude_range(scenario: Scenario) -> Range:
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     lowest, highest = float(altitudes_m.min()), float(altitudes_m.max())
     middle = (lowest + highest) / 2
-    keep_m = min(scenario.geofence.margin_m + ALTITUDE_MARGIN_M, (highest - lowest) / 2)
+    inside_m = ALTITUDE_MARGIN_M * length_scale(scenario.vehicles, scenario.dt_s)
+    keep_m = min(scenario.geofence.margin_m + inside_m, (highest - lowest) / 2)
     return lowest + keep_m, middle, highest - keep_m
 
 

@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.planning.backup.course import Course, braked
-from uas_coverage_env.planning.reserves import BRAKING_S
 
 FloatArray = NDArray[np.float64]
 
@@ -59,6 +58,7 @@ class Supervisor:
     Args:
         vehicles: (U,) records of VEHICLE_DTYPE.
         dt_s: Length of a step.
+        braking_s: In which each has braked from any speed [s].
 
     Attributes:
         backups: By UAS.
@@ -66,10 +66,10 @@ class Supervisor:
     """
 
     def __init__(
-        self, vehicles: Sequence[NDArray[np.void]] | NDArray[np.void], dt_s: float
+        self, vehicles: Sequence[NDArray[np.void]] | NDArray[np.void], dt_s: float, braking_s: float
     ) -> None:
         self._vehicles = vehicles
-        self.braking_steps = int(np.ceil(BRAKING_S / dt_s))
+        self.braking_steps = int(np.ceil(braking_s / dt_s))
         self.backups: dict[int, Course] = {}
 
     def renew(

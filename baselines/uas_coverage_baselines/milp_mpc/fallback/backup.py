@@ -37,6 +37,7 @@ from uas_coverage_baselines.milp_mpc.model.verify import trouble_between
 from uas_coverage_env.planning.backup.course import Course
 from uas_coverage_env.planning.backup.supervisor import Supervisor
 from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.scale import braking_s
 
 FloatArray = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ def backup_trajectory(
     it; where that leaves one without, all follow theirs equally long (`Supervisor.teams`).
     """
     records = [compile_vehicle(vehicle, dt_s)[()] for vehicle in problem.vehicles]
-    supervisor = Supervisor(records, dt_s)
+    supervisor = Supervisor(records, dt_s, braking_s(problem.vehicles, dt_s))
     longer = replace(problem, moving=prolonged(problem, plan.u.shape[1] + supervisor.braking_steps))
     checks = _ByBlocks(problem, longer, blocks, supervisor.braking_steps)
     courses = {uas: course_of(plan, name) for uas, name in enumerate(problem.names)}

@@ -20,8 +20,8 @@ from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.geometry.round_shapes import outside_upright_m
 from uas_coverage_env.planning.backup.braking import pushed
-from uas_coverage_env.planning.reserves import BRAKING_S
 from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.scale import braking_s
 
 FloatArray = NDArray[np.float64]
 _PUSHES_S = (2.0, 5.0, 10.0)  # how long a direction is held
@@ -38,7 +38,8 @@ def evasion(problem: PlanningProblem, dt_s: float) -> Plan | None:
         problem: the decision; moving obstacles keep their velocities.
         dt_s: sampling time.
     """
-    steps = int(np.ceil((max(_PUSHES_S) + BRAKING_S) / dt_s))
+    longest_s = max(_PUSHES_S) + braking_s(problem.vehicles, dt_s)
+    steps = int(np.ceil(longest_s / dt_s))
     ahead = replace(problem, moving=prolonged(problem, steps))
     flights = [_flights(problem, uas, steps, dt_s) for uas in range(problem.n_uas)]
     # the first flight of each is braking at once, which is kept where it is clear

@@ -28,11 +28,12 @@ from uas_coverage_env.entities.commands import COMMAND_DTYPE, HOME
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.approach import carefully, with_free_aims
 from uas_coverage_env.planning.backup.course import Course, braked
-from uas_coverage_env.planning.reserves import BRAKING_S, ROUTE_HOME_RESERVE
+from uas_coverage_env.planning.reserves import ROUTE_HOME_RESERVE
 from uas_coverage_env.vehicle import compile_vehicle, lpv_step
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.inner_loop import reseed_reference, velocity_climb_wrench
 from uas_coverage_env.vehicle.range import dod_per_s
+from uas_coverage_env.vehicle.scale import braking_s
 from uas_coverage_env.world import SwarmState, build_arena
 
 FloatArray = NDArray[np.float64]
@@ -181,7 +182,7 @@ class RouteFollower:
         """The backup trajectories with that of one UAS replaced by its route."""
         dt_s = self._brief.dt_s
         pursued = max(round(pursued_s / dt_s), 1)
-        steps = pursued + int(np.ceil(BRAKING_S / dt_s))
+        steps = pursued + int(np.ceil(braking_s(self._brief.vehicles, dt_s) / dt_s))
         steps = steps if backup is None else max(steps, backup.u.shape[1])
         flown = []
         for row, name in enumerate(problem.names):

@@ -13,7 +13,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
     WayHome,
 )
 from uas_coverage_env.geometry import cylinder_faces
-from uas_coverage_env.planning.reserves import MILP_BRAKING_S, MILP_RESERVE
+from uas_coverage_env.planning.reserves import MILP_RESERVE, milp_braking_s
 from uas_coverage_env.vehicle import LinearModel, VehicleParams
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.range import (
@@ -27,8 +27,10 @@ from uas_coverage_env.vehicle.range import (
 FloatArray = NDArray[np.float64]
 _BATTERY = [S.DOD, S.U_TH]
 
-SETTLING_S = MILP_BRAKING_S + MILP_RESERVE.landing_s
-"""What the reserve holds back beyond the flight home itself [s]."""
+
+def settling_s(vehicle: VehicleParams, dt_s: float) -> float:
+    """What the reserve holds back beyond the flight home itself [s]."""
+    return milp_braking_s(vehicle, dt_s) + MILP_RESERVE.landing_s
 
 
 class BatteryReserve:
@@ -107,7 +109,7 @@ def short_s(problem: PlanningProblem, uas: int, x: FloatArray, allowance: bool =
     way_s = float((_time_faces(problem, uas) @ (x[:3] - _towards_m(problem, uas))).max())
     spent_s = float(x[S.DOD]) / _rate(problem, uas)
     result = spent_s + way_s - _room_s(problem, uas)
-    return result if allowance else result - MILP_BRAKING_S
+    return result if allowance else result - _braking_s(problem, uas)
 
 
 def straight_seconds_home(vehicle: VehicleParams, away_m: FloatArray) -> float:
@@ -143,7 +145,11 @@ def _room_s(problem: PlanningProblem, uas: int) -> float:
     full_s = float(problem.dod_max[uas]) / _rate(problem, uas)
     way = _way_home(problem, uas)
     onward_s = 0.0 if way is None else way.onward_s
-    return full_s - MILP_RESERVE.landing_s - MILP_BRAKING_S - onward_s
+    return full_s - MILP_RESERVE.landing_s - _braking_s(problem, uas) - onward_s
+
+
+def _braking_s(problem: PlanningProblem, uas: int) -> float:
+    return milp_braking_s(problem.vehicles[uas], problem.dt_s)
 
 
 def _way_home(problem: PlanningProblem, uas: int) -> WayHome | None:
