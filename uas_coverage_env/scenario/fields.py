@@ -249,7 +249,7 @@ class Uas(StrictModel):
 
     Attributes:
         name: Unique; the agent's name in the environments.
-        vehicle: A shipped vehicle (`s500_v2`, `hexacopter`) or the path of a vehicle file,
+        vehicle: A shipped vehicle (`s500_v2`, `hexacopter`, `crazyflie`) or the path of a file,
             relative to the scenario file; held as an absolute path.
         start_m: Where it takes off and lands [m].
         soc_0: State of charge at t = 0 [-].

@@ -12,6 +12,7 @@ from uas_coverage_env.entities.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.features.feature import FEATURE_DTYPE, MissionFeature, feature_tables
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.governor import time_scale
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
 from uas_coverage_env.vehicle.scale import braking_s, clock_reserve_s, length_scale
@@ -55,6 +56,8 @@ UAS_DTYPE = record_dtype(
         ("climb_mps", "f8"),
         ("descent_mps", "f8"),
         ("dod_per_s", "f8"),
+        # of the times of guidance, see `governor.time_scale`
+        ("time_scale", "f8"),
         # bits, see `WAYPOINT_DTYPE`
         ("sensors", "i8"),
     ]
@@ -282,6 +285,7 @@ def _uas(scenario: Scenario) -> NDArray[np.void]:
                 limits.v_up_max_mps,
                 limits.v_down_max_mps,
                 dod_per_s(vehicle, entry.dod_max),  # the battery is nearly empty then
+                time_scale(vehicle),
                 sensors_of(scenario, entry),
             )
         )
