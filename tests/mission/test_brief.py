@@ -43,8 +43,7 @@ PUBLIC = {
     Scenario: {
         *("schema_version", "name", "dt_s", "max_steps", "landing_distance_m"),
         *("landing_speed_mps", "uas_safe_distance_m", "min_height_m", "from_ground"),
-        "route_margin_m",
-        *("geofence", "obstacles"),
+        *("route_margin_m", "geofence", "obstacles", "planar", "doors_m"),
         *("moving_obstacles", "uas", "waypoints", "decorations", "place", "execution"),
         *("sorties", "reserve"),
     },
@@ -64,7 +63,7 @@ PUBLIC = {
     Place: {"latitude_deg", "longitude_deg", "height_m"},
 }
 HIDDEN: dict[type, set[str]] = {
-    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "relaunch"},
+    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "relaunch", "walls"},
     MovingObstacle: {"schedule"},
 }
 

@@ -25,6 +25,7 @@ from uas_coverage_env.scenario import (
 )
 from uas_coverage_env.scenario.conditions import Conditions
 from uas_coverage_env.scenario.payload import who_covers
+from uas_coverage_env.scenario.planar import Planar
 from uas_coverage_env.scenario.reserve import LandingReserve
 from uas_coverage_env.vehicle import VehicleParams
 
@@ -68,8 +69,10 @@ class MissionBrief(StrictModel):
         min_height_m: Least height above the ground and above roofs; 0: no such rule [m].
         route_margin_m: What routes keep beyond what counts as a breach; None: derived [m].
         from_ground: Whether charge is drawn for take-off before t = 0, and for landing at the end.
+        planar: The height at which all UAS fly; None where they fly in space.
         geofence: The volume to stay in.
         obstacles: Fixed obstacles.
+        doors_m: Middles of openings at which routes may turn, (D, 2) [m].
         moving_obstacles: Moving obstacles, without their schedules.
         uas: The fleet, with home positions and charge at t = 0.
         vehicles: The vehicle of each UAS, in their order.
@@ -100,6 +103,8 @@ class MissionBrief(StrictModel):
     vehicles: tuple[VehicleParams, ...]
     waypoints: tuple[Waypoint, ...]
     decorations: tuple[Decoration, ...]
+    planar: Planar | None = None
+    doors_m: tuple[tuple[float, float], ...] = ()
     place: Place | None = None
     route_margin_m: float | None = None
     conditions: Conditions | None = None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.scenario.feasibility import back_and_forth
 from uas_coverage_env.scenario.fields import Geofence, NoFlyZone, Obstacle, Position_m, Uas
+from uas_coverage_env.scenario.planar import off_height
 from uas_coverage_env.scenario.unchecked import UncheckedScenario
 from uas_coverage_env.vehicle import load_vehicle, vehicle_names
 
@@ -34,6 +35,7 @@ def problems(scenario: UncheckedScenario) -> list[str]:
         return [*found, *without_volume]
     return [
         *found,
+        *_planar(scenario),
         *_fence(scenario),
         *_waypoints(scenario),
         *_places_and_fixed_things(scenario),
@@ -94,6 +96,20 @@ def _fence(scenario: UncheckedScenario) -> Iterator[str]:
             f"geofence.margin_m: {margin_m:g} leaves no room in a fence that is {width_m:.4g} m "
             f"thin; make the margin smaller or the fence larger"
         )
+
+
+def _planar(scenario: UncheckedScenario) -> Iterator[str]:
+    planar = scenario.planar
+    if planar is None:
+        return
+    if planar.height_m < scenario.min_height_m:
+        yield (
+            f"planar.height_m: {planar.height_m:g} is below min_height_m "
+            f"{scenario.min_height_m:g}; raise it or leave min_height_m out"
+        )
+    yield from off_height(planar, "uas", "start_m", [uas.start_m for uas in scenario.uas])
+    places_m = [waypoint.position_m for waypoint in scenario.waypoints]
+    yield from off_height(planar, "waypoints", "position_m", places_m)
 
 
 def _waypoints(scenario: UncheckedScenario) -> Iterator[str]:
@@ -259,6 +275,7 @@ def _events(scenario: UncheckedScenario) -> Iterator[str]:
 def _scene(scenario: UncheckedScenario) -> list[str]:
     found = [*_names_used_twice(scenario), *_bodies_without_volume(scenario)]
     return found or [
+        *_planar(scenario),
         *_waypoints(scenario),
         *_places_and_fixed_things(scenario),
         *_starts_and_each_other(scenario),
@@ -303,6 +320,8 @@ def _free_part(
     """Points (P, 3) of a waypoint's sphere, and whether each keeps all safe distances (P,)."""
     radius_m, waypoint = min(uas.radius_m for uas in scenario.uas), scenario.waypoints[index]
     points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
+    if scenario.planar is not None:
+        points[:, 2] = waypoint.position_m[2]
     if waypoint.heights_m is not None:
         lowest_m, highest_m = waypoint.heights_m
         points = points[(lowest_m <= -points[:, 2]) & (-points[:, 2] <= highest_m)]

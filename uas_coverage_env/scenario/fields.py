@@ -41,6 +41,7 @@ Distance_m = Annotated[float, Field(ge=0.0, le=10_000.0)]
 Length_m = Annotated[float, Field(gt=0.0, le=10_000.0)]
 Speed_mps = Annotated[float, Field(ge=-1_000.0, le=1_000.0)]
 Position_m = Annotated[tuple[Coordinate_m, Coordinate_m, Coordinate_m], BeforeValidator(_as_tuple)]
+Level_m = Annotated[tuple[Coordinate_m, Coordinate_m], BeforeValidator(_as_tuple)]
 Velocity_mps = Annotated[tuple[Speed_mps, Speed_mps, Speed_mps], BeforeValidator(_as_tuple)]
 Points_m = Annotated[
     tuple[tuple[Coordinate_m, Coordinate_m, Coordinate_m], ...],

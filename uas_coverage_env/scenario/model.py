@@ -34,8 +34,12 @@ class Scenario(UncheckedScenario):
             it after the last sample; without it missions begin and end in the air.
         relaunch: Whether landed UAS take off again on their remaining charge, when no other UAS is
             working; without it, a UAS that has landed stays on the ground.
+        doors_m: Middles of openings at which routes may turn, north and east, (D, 2) [m].
+        planar: For missions in a plane: the height at which all UAS fly, start and land.
         geofence: The volume to stay in.
         obstacles: Fixed obstacles.
+        walls: Walls with doors; in the scenario that is read they are `obstacles`, and their doors
+            `doors_m`.
         moving_obstacles: Moving obstacles.
         uas: The fleet.
         waypoints: Points to be covered.

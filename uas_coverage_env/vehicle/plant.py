@@ -9,6 +9,9 @@ theta = atan(theta_lin(t)), and the velocities of the step come out as predicted
 A UAS that looks where it flies has its tilts on axes that do not turn (`layout`). It is flown as
 if it faced north: its heading goes beside, as the LPV model has it, and nothing depends on it.
 
+In a planar mission the vertical axis is a constraint: height and vertical speed are put back after
+every substep, and the thrust (m g + L) / (cos phi cos theta) carries the weight at the tilt flown.
+
 Left out: motor lag (30 ms against steps of a second), the gyroscopic torque of the rotors, the
 loss of motor speed with a falling battery voltage, what a turn to the course does to the tilts.
 """
@@ -233,7 +236,7 @@ def plant_step(vehicle, x, u, x_next):
         further_V[p] = vehicle.further_V[p]
     for s in range(x.shape[0]):
         x_next[s] = x[s]
-    psi, yaw_rate, yaw_torque = x[S.PSI], x[S.WZ], u[S.TAU_Z]
+    down_m, psi, yaw_rate, yaw_torque = x[S.Z], x[S.PSI], x[S.WZ], u[S.TAU_Z]
     if rarely(vehicle.follows_course):
         x_next[S.PSI] = u[S.TAU_Z] = 0.0
         # the body's own rate, at which its tilts do not turn it
@@ -278,6 +281,8 @@ def plant_step(vehicle, x, u, x_next):
             torque[axis] *= vehicle.thrust_factor
         thrust *= vehicle.thrust_factor
         _integrate(vehicle, x_next, h, thrust, torque, slope, total, middle)
+        if rarely(vehicle.holds_height):
+            x_next[S.Z], x_next[S.VZ] = down_m, 0.0
     if rarely(vehicle.follows_course):
         u[S.TAU_Z] = yaw_torque
         x_next[S.PSI], x_next[S.WZ] = psi, yaw_rate

@@ -256,6 +256,10 @@ def _vehicles(scenario: Scenario) -> NDArray[np.void]:
     for i, vehicle in enumerate(scenario.vehicles):
         records[i] = compiled[vehicle]
     records["follows_course"] = [uas.heading == "course" for uas in scenario.uas]
+    if scenario.planar is not None:
+        # no input acts on a height that is fixed
+        records["holds_height"] = True
+        records["lift_min_N"] = records["lift_max_N"] = 0.0
     return records
 
 
@@ -317,6 +321,8 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
     rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - route_margin_m(scenario)
+    if scenario.planar is not None:
+        rules["floor_m"] = rules["ceiling_m"] = scenario.planar.height_m
     rules["length_scale"] = length_scale(scenario.vehicles, scenario.dt_s)
     rules["clock_reserve_s"] = clock_reserve_s(_CLOCK_RESERVE_S, scenario.max_steps * scenario.dt_s)
     rules["brake"]["kind"] = CLIMB

@@ -19,6 +19,9 @@ from uas_coverage_env.world import Arena
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+TALL_M = 1e9
+"""Of what nothing passes over or under in a plane [m]."""
+
 _BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it
 # at scale 1
 _FENCE_MARGIN_M = 0.1
@@ -102,16 +105,20 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         margin_m: Planned beyond the distances that count as a breach.
     """
     rules, obstacles = arena.rules[0], arena.obstacles
-    rows = [np.arange(o["first_face"], o["last_face"]) for o in obstacles]
+    planar = bool(arena.vehicles[uas]["holds_height"])
+    first, last = ("first_kept", "last_kept") if planar else ("first_face", "last_face")
+    rows = [np.arange(o[first], o[last]) for o in obstacles]
     faces = np.concatenate([np.zeros(0, np.int64), *rows])
     least_m = float(arena.uas[uas]["radius_m"]) + obstacles["safe_distance_m"]
     fence = slice(int(rules["fence_first"]), int(rules["fence_last"]))
-    height_m = float(rules["min_height_m"])
+    height_m = 0.0 if planar else float(rules["min_height_m"])
     # over roofs, what the distance to keep leaves of the least height raises the upper faces
     upward = np.maximum(-arena.normals[faces, 2], 0.0)
     of_obstacle = np.repeat(np.arange(len(rows)), [len(row) for row in rows])
     raised_m = np.maximum(height_m * upward - least_m[of_obstacle], 0.0)
     low_m = obstacles["hull_middle_m"] - obstacles["hull_half_m"]
+    if planar:
+        low_m[:, 2] = -TALL_M  # nothing is passed over
     np.minimum.at(low_m[:, 2], of_obstacle, low_m[of_obstacle, 2] - raised_m)
     return Space(
         normals=np.ascontiguousarray(arena.normals[faces]),
