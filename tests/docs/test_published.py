@@ -36,10 +36,10 @@ def test_commands_say_where_their_results_go_and_run_here():
 
 
 def test_each_benchmark_that_a_page_names_is_run():
-    """But for those that fill pages or prepare a figure, and those that only a user runs."""
+    """But for those that fill pages or prepare a figure, and one that needs a GPU."""
     named = {name for page in pages() for name in BENCHMARK.findall(page.read_text("utf-8"))}
     run_by = BENCHMARK.findall(publish.FIGURES.read_text("utf-8"))
-    assert named - set(run_by) <= {"publish.py", "put_table.py"}
+    assert named - set(run_by) <= {"publish.py", "put_table.py", "gpu.py"}
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def project(tmp_path, monkeypatch):
     (root / "docs").mkdir()
     (root / "README.md").write_text(page("first", "by hand"))
     other = page("second", "old") + "`python benchmarks/two.py`: 7\n"
-    (root / "docs" / "page.md").write_text(other)
+    (root / "docs" / "rules.md").write_text(other)
     (root / "benchmarks" / "one.py").write_text(
         f"open('again', 'a').write('1')\nprint({TABLE + '| `one` | 1 |'!r})\n"
     )
@@ -61,7 +61,7 @@ def project(tmp_path, monkeypatch):
     )
     (root / "benchmarks" / "put.py").write_text(
         "import pathlib, sys\n"
-        "page = pathlib.Path(sys.argv[1]) / 'docs' / 'page.md'\n"
+        "page = pathlib.Path(sys.argv[1]) / 'docs' / 'rules.md'\n"
         "page.write_text(page.read_text().replace('(not filled yet)', 'NEW'))\n"
     )
     committed(root)
@@ -103,7 +103,7 @@ def test_pages_and_results_hold_what_the_commands_of_one_commit_made(project, tm
     found = results(project)
     assert found["commit"] == commit
     assert not found["quick"]
-    assert set(found["tables"]) == {"README.md: first", "docs/page.md: second"}
+    assert set(found["tables"]) == {"README.md: first", "docs/rules.md: second"}
     for where, table in found["tables"].items():
         name, _, mark = where.partition(": ")
         on_page = {m: text for p, m, text in places(project) if p == project / name}[mark]
@@ -111,8 +111,8 @@ def test_pages_and_results_hold_what_the_commands_of_one_commit_made(project, tm
     first = found["tables"]["README.md: first"]
     assert first["text"] == f"`python benchmarks/one.py`\n\n{TABLE}| `one` | 1 |"
     assert first["command"] == "python benchmarks/one.py"
-    assert found["tables"]["docs/page.md: second"]["text"] == "NEW"
-    assert "to be read: docs/page.md:" in capsys.readouterr().out
+    assert found["tables"]["docs/rules.md: second"]["text"] == "NEW"
+    assert "to be read: docs/rules.md:" in capsys.readouterr().out
 
 
 def test_what_was_made_is_not_made_again_and_what_failed_is(project, tmp_path, capsys):
@@ -160,7 +160,7 @@ def test_a_part_or_a_quick_run_leaves_the_pages_alone(project, tmp_path, given):
 def test_a_page_that_is_not_filled_is_an_error(project, tmp_path):
     (project / "benchmarks" / "put.py").write_text("")
     committed(project)
-    with pytest.raises(InputError, match=r"two: has not filled <!-- second --> of page\.md"):
+    with pytest.raises(InputError, match=r"two: has not filled <!-- second --> of rules\.md"):
         run(tmp_path / "out")
     assert "by hand" in (project / "README.md").read_text()
 
