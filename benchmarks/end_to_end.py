@@ -1,6 +1,6 @@
 """How `learned-velocity` fares alone: without safety filter, without return mode.
 
-    python benchmarks/end_to_end.py                  # agents/README.md, a few minutes
+    python benchmarks/end_to_end.py                  # a few minutes
     python benchmarks/end_to_end.py --missions 20
 
 Flies validation towns with ever more obstacles, on which nothing was trained.
@@ -13,14 +13,13 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
-from learners import machine, put, shown
+from learners import shown
 from numpy.typing import NDArray
 from uas_coverage_agents.training.scenarios import VALIDATION, town
 
 from uas_coverage_env import Scenario, load_planner, rollout
 from uas_coverage_env.flight.metrics import coverage, energy_Wh, home
 
-NAME = "end-to-end"
 PLANNER = "learned-velocity"
 LEVELS = {"none": (0, 0), "1 to 3": (1, 3), "5 to 20": VALIDATION.n_obstacles}
 HEAD = (
@@ -29,22 +28,19 @@ HEAD = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Fly, print and fill the README; the exit code."""
+    """Fly and print; the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--missions", type=int, default=100, help="towns of each level")
     arguments = parser.parse_args(argv)
     if not 1 <= arguments.missions <= 100:
         parser.error("--missions: 1 to 100")
     lines = [
-        f"`python benchmarks/end_to_end.py --missions {arguments.missions}`; {machine()}.",
-        "",
         f"| {' | '.join(HEAD)} |",
         f"|---|{'---:|' * (len(HEAD) - 1)}",
     ]
     lines += [row(name, flown(towns_of(name, arguments.missions))) for name in LEVELS]
     text = "\n".join(lines)
     sys.stdout.write(f"{text}\n")
-    put(NAME, text)
     return 0
 
 

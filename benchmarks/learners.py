@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from marks import ROOT, filled
 from numpy.typing import NDArray
 from uas_coverage_agents.policy import Policy, load_policy
 from uas_coverage_agents.training import curve
@@ -32,7 +33,6 @@ from uas_coverage_env import Scenario
 from uas_coverage_env.leaderboard import PlannerSpec
 from uas_coverage_env.runner.workers import Workers
 
-ROOT = Path(__file__).parents[1]
 README = ROOT / "agents" / "README.md"
 PICTURES = ROOT / "docs" / "pictures"
 LEARNER, NAME = "learned-velocity", "route-velocity"
@@ -188,12 +188,7 @@ def put(name: str, text: str, page: Path | None = None) -> None:
         ValueError: There are no such marks.
     """
     page = page or README
-    begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
-    before, found, rest = page.read_text(encoding="utf-8").partition(begin)
-    _, ended, after = rest.partition(end)
-    if not found or not ended:
-        raise ValueError(f"{page} has no {begin} ... {end}")
-    page.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")
+    page.write_text(filled(page.read_text("utf-8"), text, name), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from marks import ROOT, filled
 
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.statistics import iqm
@@ -28,13 +29,10 @@ from uas_coverage_env.tasks.levels import level_names
 from uas_coverage_env.tasks.scoring import RANDOM, Anchors, MissionScore, scored
 from uas_coverage_env.tasks.table import markdown
 
-ROOT = Path(__file__).parents[1]
 ANCHORS = ROOT / "uas_coverage_env" / "tasks" / "anchors.json"
 PAGE = ROOT / "docs" / "level_scores.md"
 Flown = dict[str, dict[str, list[MissionScore]]]
 """Level -> planner -> its missions."""
-
-FIRST, LAST = "<!-- scores -->\n", "<!-- end of scores -->"
 
 
 def main() -> None:
@@ -49,11 +47,7 @@ def main() -> None:
         anchors[level] = found if first else {"random": found["random"]}
     ANCHORS.write_text(json.dumps(anchors, indent=2) + "\n", encoding="utf-8")
     text = PAGE.read_text("utf-8")
-    before, first, rest = text.partition(FIRST)
-    _, last, after = rest.partition(LAST)
-    if not first or not last:
-        raise SystemExit(f"{PAGE}: has no {FIRST.strip()} ... {LAST}")
-    PAGE.write_text(before + first + tables(flown) + last + after, encoding="utf-8")
+    PAGE.write_text(filled(text, tables(flown), "scores"), encoding="utf-8")
 
 
 def missions_in(folder: Path) -> Flown:

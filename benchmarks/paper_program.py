@@ -19,7 +19,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from put_table import filled
+from marks import filled
 from rich.console import Console
 from uas_coverage_baselines.milp_mpc import MilpMpcPaper
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason

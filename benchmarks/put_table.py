@@ -22,32 +22,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from marks import ROOT, filled
+
 from uas_coverage_env.files.digits import three_digits
 
-ROOT = Path(__file__).parents[1]
 UNCERTAIN = ("light", "moderate", "strong", "nonlinear")  # where no flight is as the model has it
 MARKS = ("leaderboard", "test", "karhula", "searched", "horizon", *UNCERTAIN)
 COLUMNS_EXPLAINED = "Interquartile means"
 PICTURE = ROOT / "docs" / "pictures" / "leaderboard.png"
-
-
-def marks_of(mark: str) -> tuple[str, str]:
-    """The lines before and after what is filled in."""
-    return f"<!-- {mark} -->\n", f"<!-- end of {mark} -->\n"
-
-
-def filled(text: str, content: str, mark: str) -> str:
-    """The text with something new between its marks.
-
-    Raises:
-        ValueError: It has no marks.
-    """
-    first, last = marks_of(mark)
-    before, begin, rest = text.partition(first)
-    _, end, after = rest.partition(last)
-    if not begin or not end:
-        raise ValueError(f"has no {first.strip()} ... {last.strip()}")
-    return f"{before}{begin}\n{content.strip()}\n\n{end}{after}"
 
 
 def short_table(data: dict[str, Any], mark: str = "leaderboard") -> str:

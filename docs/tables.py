@@ -75,6 +75,7 @@ def scenario_fields() -> str:
     nested = {
         "`[[uas.sensors]]`": "Sensor",
         "`[[moving_obstacles.schedule]]`": "ScheduledVelocity",
+        "`[[walls.doors]]`": "Door",
         "`[[wind.gusts]]`": "Gust",
         "`[wind.random_gusts]`": "RandomGusts",
     }
@@ -128,7 +129,9 @@ def _type(entry: dict[str, Any]) -> str:
         return " or ".join(f'`"{value}"`' for value in entry["enum"])
     if entry["type"] == "array":
         if "prefixItems" in entry:
-            return f"{len(entry['prefixItems'])} numbers"
+            most = len(entry["prefixItems"])
+            least = "" if entry["minItems"] == most else f"{entry['minItems']} or "
+            return f"{least}{most} numbers"
         least = f", at least {entry['minItems']}" if "minItems" in entry else ""
         tables = {"$ref", "oneOf"} & set(entry["items"])
         of = "tables" if tables else f"entries of {_type(entry['items'])}"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FIRST = ("README.md", "docs/quickstart.md", "docs/from_area_to_flight.md", "docs/notebooks.md")
+FIRST = ("README.md", "docs/quickstart.md", "docs/from_area_to_flight.md")
 PAGES = {page: (ROOT / page).read_text(encoding="utf-8") for page in FIRST}
 ENVIRONMENT = "python3 -m venv .venv && . .venv/bin/activate && "
 MANAGED = any(Path("/usr/lib").glob("python3*/EXTERNALLY-MANAGED"))

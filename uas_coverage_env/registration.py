@@ -11,7 +11,7 @@ import pettingzoo
 _MODULE = re.compile(r"uas_coverage_(v(\d+))")
 """Of a version of the environments; its version is `VERSION` there."""
 
-LEVEL_NAMES = ("easy", "medium", "hard", "extreme")
+LEVEL_NAMES = ("easy", "medium", "hard", "extreme", "air-taxi")
 """Those of `tasks.LEVELS`, which is not imported here: a test compares them."""
 
 _TASKS = "uas_coverage_env.tasks.make"
@@ -33,9 +33,14 @@ def register_environments() -> None:
         _register_pettingzoo("aec", f"uas/coverage-{version}", f"{module}:env")
         for level in LEVEL_NAMES:
             of = level if version == "v0" else f"{level}-{version}"
-            _register_gymnasium(f"UASCoverage/{level.capitalize()}-{version}", _TASKS, level=of)
+            _register_gymnasium(level_id(level, version), _TASKS, level=of)
             name, found = f"uas/coverage-{level}-{version}", f"{_TASKS}:parallel_env"
             _register_pettingzoo("parallel", name, found, level=of)
+
+
+def level_id(level: str, version: str) -> str:
+    """Under which Gymnasium knows a level: `air-taxi` as `UASCoverage/AirTaxi-v0`."""
+    return f"UASCoverage/{''.join(word.capitalize() for word in level.split('-'))}-{version}"
 
 
 def _register_gymnasium(name: str, module: str, **kwargs: str) -> None:

@@ -12,6 +12,7 @@ from uas_coverage_env.flight import AssistedOptions
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.planning.following.following import first_of
 from uas_coverage_env.planning.reserves import LAWNMOWER
+from uas_coverage_env.scenario.feasibility import along_ways
 from uas_coverage_env.vehicle.range import dod_per_s, level_seconds, speeds_of
 from uas_coverage_env.world import Command, GoTo, SwarmState
 
@@ -38,8 +39,16 @@ class Lawnmower:
         """Order the waypoints and cut the order into runs of about equal time."""
         self._targets = Targets(brief)
         self._can_cover = brief.can_cover
+        self._runs = self._runs_of(brief)
+        self.routes = None if brief.execution is None else self._runs
+
+    def _runs_of(self, brief: MissionBrief) -> list[list[int]]:
+        """The run of each UAS; where one lands elsewhere, what lies on the ways."""
         waypoints_m = np.array([waypoint.position_m for waypoint in brief.waypoints])
-        self._runs: list[list[int]] = [[] for _ in brief.uas]
+        ends_m = np.array([(uas.start_m, uas.home_m) for uas in brief.uas])
+        if (ends_m[:, 0] != ends_m[:, 1]).any():
+            return along_ways(ends_m[:, 0], ends_m[:, 1], waypoints_m, brief.can_cover)
+        runs: list[list[int]] = [[] for _ in brief.uas]
         kinds = np.unique(brief.can_cover, axis=1)
         for able in kinds.T:
             # waypoints that the same UAS can cover, cut among these
@@ -48,8 +57,8 @@ class Lawnmower:
             team = np.flatnonzero(able).tolist()
             if team:
                 for u, run in zip(team, plan_runs(_brief_of(brief, team), order), strict=True):
-                    self._runs[u] += run
-        self.routes = None if brief.execution is None else self._runs
+                    runs[u] += run
+        return runs
 
     @property
     def given_up(self) -> dict[int, str]:
@@ -138,7 +147,7 @@ class _Cuts:
         cruise_mps = min(vehicle.limits.v_cruise_mps for vehicle in brief.vehicles)
         speeds = speeds_of(brief.vehicles[0])._replace(level_mps=cruise_mps)
         route_m = np.array([brief.waypoints[waypoint].position_m for waypoint in order])
-        homes_m = np.array([uas.start_m for uas in brief.uas])
+        homes_m = np.array([uas.home_m for uas in brief.uas])
         between_m = np.linalg.norm(np.diff(route_m, axis=0), axis=1)
         at_m = np.concatenate([[0.0], np.cumsum(between_m)])
         self._at_s = level_seconds(LAWNMOWER, speeds, at_m)
@@ -175,7 +184,7 @@ def _allowed_times_s(brief: MissionBrief) -> NDArray[np.float64]:
     """(U,) [s] flight at full speed that the charge of each UAS allows."""
     return np.array(
         [
-            _USABLE * (uas.dod_max - (1.0 - uas.soc_0)) / dod_per_s(vehicle, uas.dod_max)
-            for uas, vehicle in zip(brief.uas, brief.vehicles, strict=True)
+            _USABLE * (dod - (1.0 - uas.soc_0)) / dod_per_s(vehicle, dod)
+            for uas, vehicle, dod in zip(brief.uas, brief.vehicles, brief.dod_landed, strict=True)
         ]
     )

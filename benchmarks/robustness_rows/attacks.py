@@ -211,5 +211,6 @@ RANDOM = Row(
         f"from {return_mode.FIRST_SEED} on, every family and policy of `benchmarks/return_mode.py`"
     ),
     "Moving obstacles (`benchmarks/safety_filter.py` has them), and strong wind, in which some are "
-    "lost (`docs/range.md`). In m/s, the wind is constant, and unknown to planner and file.",
+    "lost (`docs/safety_filter.md`). In m/s, the wind is constant, and unknown to planner and "
+    "file.",
 )

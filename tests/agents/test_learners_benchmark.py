@@ -81,8 +81,6 @@ def test_means_stand_with_their_intervals_and_differences_in_percent(tmp_path):
 
 
 def test_what_flies_alone_is_told_for_ever_more_obstacles():
-    text = learners.README.read_text(encoding="utf-8")
-    assert text.count(f"<!-- {end_to_end.NAME} -->") == 1
     assert not end_to_end.towns_of("none", 1)[0].obstacles
     assert 5 <= len(end_to_end.towns_of("5 to 20", 1)[0].obstacles) <= 20
     town = generate_scenario(900_600, n_uas=1, n_waypoints=2, n_obstacles=0)

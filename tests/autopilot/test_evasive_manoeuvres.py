@@ -10,7 +10,7 @@ from uas_coverage_env.simulation import World
 from uas_coverage_env.world import Velocity
 
 VEHICLES = Path(__file__).parents[1] / "vehicles"
-CRAZYFLIE, AIR_TAXI = str(VEHICLES / "crazyflie.toml"), str(VEHICLES / "air_taxi.toml")
+CRAZYFLIE, AIR_TAXI = "crazyflie", str(VEHICLES / "air_taxi.toml")
 RADIUS_M = {CRAZYFLIE: 0.07, "s500_v2": 0.36, AIR_TAXI: 8.15}
 
 

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from return_states import FLYABLE, flown_states, flown_wind_mps
 
 VEHICLES = Path(__file__).parents[1] / "vehicles"
-CRAZYFLIE, AIR_TAXI = str(VEHICLES / "crazyflie.toml"), str(VEHICLES / "air_taxi.toml")
+CRAZYFLIE, AIR_TAXI = "crazyflie", str(VEHICLES / "air_taxi.toml")
 
 
 @pytest.mark.parametrize("wind_mps", [0.0, 8.0])

@@ -98,7 +98,7 @@ def test_a_propeller_may_be_its_diameter_alone(capsys):
     [
         (
             {"mass_kg": "0"},
-            "vehicle new: mass_kg: should be greater than or equal to 0.05",
+            "vehicle new: mass_kg: should be greater than or equal to 0.01",
         ),
         ({"mass_kg": "nan"}, "vehicle new: mass_kg: should be a finite number, not nan"),
         ({"mass_kg": "heavy"}, "Invalid value for '--mass-kg'"),

@@ -59,7 +59,7 @@ def cut_short(notebook, name):
 
 def test_there_are_nine_lessons_and_pages_lead_to_them():
     assert "".join(path.name[0] for path in NOTEBOOKS) == "123456789"
-    text = (ROOT / "docs" / "notebooks.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "quickstart.md").read_text(encoding="utf-8")
     assert all(f"(lessons/{path.name})" in text for path in NOTEBOOKS)
 
 

@@ -1,24 +1,26 @@
-"""Every claim of the page on safety names a test that there is."""
+"""Every claim of the pages on safety and on failures names a test that there is."""
 
 import ast
 import re
 
+import pytest
 from markdown_blocks import ROOT
 
-PAGE = ROOT / "docs" / "safety.md"
+PAGES = {"safety.md": "claim", "faults.md": "row"}
 TESTS = ROOT / "tests"
 
 
-def claims():
+def claims(page):
     """Of each row of the table: the claim, and its tests as (file, name)."""
-    text = PAGE.read_text(encoding="utf-8")
-    table = text.split("| claim | test |\n|---|---|\n")[1].split("\n\n")[0]
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    table = text.split(f"| {PAGES[page]} | test |\n|---|---|\n")[1].split("\n\n")[0]
     rows = [row.strip("| ").split(" | ") for row in table.splitlines()]
     return {claim: re.findall(r"`([\w/]+\.py)::(\w+)`", tests) for claim, tests in rows}
 
 
-def test_every_claim_names_a_test_that_there_is():
-    found = claims()
+@pytest.mark.parametrize("page", PAGES)
+def test_every_claim_names_a_test_that_there_is(page):
+    found = claims(page)
     assert len(found) > 20
     missing = [claim for claim, tests in found.items() if not tests]
     for claim, tests in found.items():

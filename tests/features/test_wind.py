@@ -164,7 +164,7 @@ def test_the_power_of_the_rotor_model_at_airspeeds_beyond_the_limit(dynamics):
 
 
 def test_the_page_tells_the_power_of_both_models():
-    page = (Path(__file__).parents[2] / "docs" / "wind_method.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "wind_and_models.md").read_text(encoding="utf-8")
     rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("|")]
     told = {
         head: [float(cell) for cell in cells]

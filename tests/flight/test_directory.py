@@ -22,6 +22,7 @@ FILES = {
     "flight.csv",
     "moving_obstacles.csv",
     "plan.csv",
+    "legs.csv",
     "rewards.csv",
     "summary.json",
     "run.json",

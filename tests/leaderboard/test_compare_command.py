@@ -282,6 +282,20 @@ def test_a_flight_that_kills_every_process_is_named_and_the_others_are_kept(
     assert len(flights()) == 4
 
 
+def test_a_planner_of_ones_own_whose_file_has_changed_is_another_one(yard, elsewhere, capsys):
+    file = elsewhere / "own_circles.py"
+    circles = "from uas_coverage_baselines.hover import Hover\nclass Circles(Hover):\n    pass\n"
+    file.write_text(circles)
+    planners = "hover,own_circles:Circles"
+    assert compare(yard, planners=planners) == 0
+    file.write_text(circles + "    radius_m = 3.0\n")
+    capsys.readouterr()
+    assert compare(yard, planners=planners) == 2
+    assert "own_circles:Circles: own_sha256 is " in capsys.readouterr().err
+    assert compare(yard, "--reuse", "sweep", planners=planners, out="edited") == 0
+    assert "2 of 4 flights are there" in capsys.readouterr().out
+
+
 def test_a_policy_that_changes_under_way_fails(yard, with_planners):
     class Policy:
         fingerprint = "other weights"

@@ -1,6 +1,7 @@
 """The script that publishes a comparison in the READMEs."""
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,9 @@ from leaderboard_rows import failed_row, row
 from uas_coverage_env.leaderboard import Comparison
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "benchmarks"))
+
+from marks import marks_of  # noqa: E402
 
 
 @pytest.fixture
@@ -18,7 +22,7 @@ def put_table(tmp_path, monkeypatch):
     spec.loader.exec_module(module)
     for name in ("README.md", "baselines/README.md"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        blocks = ["{}old\n{}".format(*module.marks_of(mark)) for mark in module.MARKS]
+        blocks = ["{}old\n{}\n".format(*marks_of(mark)) for mark in module.MARKS]
         (tmp_path / name).write_text(f"before\n{''.join(blocks)}after\n")
     monkeypatch.setattr(module, "ROOT", tmp_path)
     monkeypatch.setattr(module, "PICTURE", tmp_path / "picture.png")
@@ -66,7 +70,7 @@ def test_the_test_set_has_marks_of_its_own(put_table, tmp_path):
     readme, other = tmp_path / "baselines/README.md", tmp_path / "README.md"
     untouched = other.read_text()
     assert put_table.main(str(sweep), "test") == 0
-    begin, end = put_table.marks_of("test")
+    begin, end = marks_of("test")
     inside = readme.read_text().split(begin)[1].split(end)[0]
     assert "| `p` | 2/2 | 0 | 1.00 |" in inside
     assert "bound" not in inside  # nothing has one
@@ -81,7 +85,7 @@ def test_tables_of_flights_in_wind_say_how_much_was_covered_and_who_came_home(pu
     sweep.mkdir()
     Comparison.of([*rows, failed_row("a", "q")], 5, "base", "a command", "1").write(sweep)
     assert put_table.main(str(sweep), "strong") == 0
-    begin, end = put_table.marks_of("strong")
+    begin, end = marks_of("strong")
     inside = (tmp_path / "baselines/README.md").read_text().split(begin)[1].split(end)[0]
     headings = inside.splitlines()[3]
     assert "| all home | violations | breaches | covered, % |" in headings

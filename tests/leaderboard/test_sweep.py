@@ -12,6 +12,7 @@ from uas_coverage_env.flight import Flight, rollout
 from uas_coverage_env.leaderboard import Sweep, planner_specs_of, scenarios_of
 from uas_coverage_env.leaderboard.flying import fly, kept_as
 from uas_coverage_env.leaderboard.hashing import content_hash, source_hash
+from uas_coverage_env.leaderboard.planner_specs import PlannerSpec
 from uas_coverage_env.leaderboard.row import TIMES
 from uas_coverage_env.leaderboard.scenario_sets import SETS, scenario_hash
 from uas_coverage_env.leaderboard.sweep import source_of
@@ -180,3 +181,17 @@ def test_the_source_of_a_single_module_counts_as_that_of_a_package_does(tmp_path
         hashes.add(source_hash(["my_single_planner"]))
     assert len(hashes) == 2
     assert source_hash(["my_single_planner"]) != source_hash(["no_such_planner_at_all"])
+
+
+def test_an_edited_block_of_ones_own_makes_another_planner(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "own_ceiling.py"
+    file.write_text("class Ceiling:\n    def add_to(self, milp, v, problem):\n        pass\n")
+    options = {"blocks": "own_ceiling:Ceiling"}
+    first, same = (PlannerSpec.named("low", "milp-mpc", options) for _ in range(2))
+    file.write_text(file.read_text() + "# lower\n")
+    edited = PlannerSpec.named("low", "milp-mpc", options)
+    assert first.identity() == same.identity() != edited.identity()
+    assert "own_sha256" not in PlannerSpec.named("low", "milp-mpc", {}).identity()
+    with pytest.raises(InputError, match="have changed"):
+        first.load()

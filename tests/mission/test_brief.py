@@ -43,16 +43,18 @@ PUBLIC = {
     Scenario: {
         *("schema_version", "name", "dt_s", "max_steps", "landing_distance_m"),
         *("landing_speed_mps", "uas_safe_distance_m", "min_height_m", "from_ground"),
-        "route_margin_m",
-        *("geofence", "obstacles"),
+        *("route_margin_m", "geofence", "obstacles", "planar", "doors_m"),
         *("moving_obstacles", "uas", "waypoints", "decorations", "place", "execution"),
-        "sorties",
+        *("sorties", "reserve"),
     },
     MovingObstacle: {"name", "kind", "radius_m", "height_m", "safe_distance_m", "start_m"},
     # these are handed over as they are
     Geofence: {"margin_m", "vertices_m"},
     Obstacle: {"name", "kind", "safe_distance_m", "vertices_m"},
-    Uas: {"name", "vehicle", "start_m", "soc_0", "radius_m", "dod_max", "sensors", "heading"},
+    Uas: {
+        *("name", "vehicle", "start_m", "land_m", "soc_0", "radius_m", "dod_max"),
+        *("sensors", "heading"),
+    },
     Waypoint: {
         *("kind", "position_m", "radius_m", "weight"),
         *("sensor", "heights_m", "max_speed_mps", "again_after_s"),
@@ -61,7 +63,7 @@ PUBLIC = {
     Place: {"latitude_deg", "longitude_deg", "height_m"},
 }
 HIDDEN: dict[type, set[str]] = {
-    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "relaunch"},
+    Scenario: {"wind", "uncertainty", "disturbances", "events", "sensing", "relaunch", "walls"},
     MovingObstacle: {"schedule"},
 }
 

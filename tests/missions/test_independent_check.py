@@ -222,7 +222,7 @@ def test_it_sees_that_a_uas_was_taken_home_by_hand(copied):
 
     rewrite(copied / "flight.csv", stop_early)
     rewrite(copied / "moving_obstacles.csv", lambda rows: rows.__delitem__(slice(10, None)))
-    assert "from its start" in problems(copied)
+    assert "from its home" in problems(copied)
 
 
 def test_it_sees_a_plan_whose_first_step_was_not_flown(copied):

@@ -74,3 +74,19 @@ def test_every_visit_of_a_waypoint_that_is_asked_for_again_is_in_the_files():
     made = make_export(flight, ExportOptions("ardupilot"))
     assert sum(file["waypoints_passed"] for file in made.data["uas"]) == 4
     assert not any(note.endswith("may be missed") for note in made.notes)
+
+
+def test_a_uas_that_lands_elsewhere_is_told_to_land_there_and_to_return_there():
+    places = ((150.0, 60.0, -20.0), (150.0, 130.0, -20.0))
+    data = meadow((START_M,), waypoints=[waypoint(place_m, 8.0) for place_m in places])
+    data = data.model_dump(mode="json", by_alias=True)
+    data["uas"][0]["land_m"] = OTHER_M
+    mission = parse(data, Scenario, "mission").model_copy(update={"place": HERE})
+    made = make_export(rollout(mission, load_planner("nearest-waypoint")), ExportOptions("qgc"))
+    assert problems(made.files["uas_1.plan"]) == []
+    plan = json.loads(made.files["uas_1.plan"])
+    (land,) = [item for item in plan["mission"]["items"] if item["command"] == LAND]
+    assert math.dist(place_of(land), OTHER_M[:2]) < 0.01
+    rally = plan["rallyPoints"]["points"][0]
+    assert math.dist(LocalFrame(HERE).to_ned(rally[0], rally[1], 0.0)[:2], OTHER_M[:2]) < 0.01
+    assert "RALLY_INCL_HOME,0\n" in made.files["uas_1.param"]

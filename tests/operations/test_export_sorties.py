@@ -23,6 +23,7 @@ from uas_coverage_env import rollout
 from uas_coverage_env.cli import main
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import fly_sorties
+from uas_coverage_env.flight.take_offs import sorties_of
 from uas_coverage_env.operations import (
     ExportOptions,
     LocalFrame,
@@ -30,7 +31,6 @@ from uas_coverage_env.operations import (
     make_export,
     read_log,
 )
-from uas_coverage_env.operations.sorties import sorties_of
 from uas_coverage_env.operations.stream import RealClock, StreamOptions, stream_flight
 from uas_coverage_env.planning.execution.lateness import Timed, pairs_of
 from uas_coverage_env.planning.execution.separation import ready_s

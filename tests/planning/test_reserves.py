@@ -34,7 +34,7 @@ MODELS = {
     if isinstance(value, TravelTimeModel)
 }
 ROOT = Path(__file__).parents[2]
-DOCS = ROOT / "docs" / "range_method.md"
+DOCS = ROOT / "docs" / "range.md"
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -99,7 +99,7 @@ def test_no_planner_is_told_of_what_will_happen():
         ),
         (
             {**ONE_OF_EACH[13], "alternative_m": [900.0, 0.0, -1.0]},
-            "events[0] (home_closed): then uas[0].start_m: (900, 0, -1) lies 700 m outside",
+            "events[0] (home_closed): then uas[0].land_m: (900, 0, -1) lies 700 m outside",
         ),
     ],
 )

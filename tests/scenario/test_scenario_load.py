@@ -35,7 +35,15 @@ def mistake_in(tmp_path, text):
 
 
 def test_the_shipped_scenarios_load_by_name_and_give_no_warning():
-    known = ("corridor", "gasche2025", "karhula", "mixed_fleet", "open_field", "village")
+    known = (
+        "air_taxi",
+        "corridor",
+        "gasche2025",
+        "karhula",
+        "mixed_fleet",
+        "open_field",
+        "village",
+    )
     assert scenario_names() == known
     for name in scenario_names():
         scenario = load_scenario(name)
@@ -44,7 +52,7 @@ def test_the_shipped_scenarios_load_by_name_and_give_no_warning():
 
 
 def test_an_unknown_name_lists_what_there_is():
-    with pytest.raises(InputError, match="unknown scenario 'moon'; take corridor, gasche2025"):
+    with pytest.raises(InputError, match="unknown scenario 'moon'; take air_taxi, corridor"):
         load_scenario("moon")
     with pytest.raises(InputError, match="unknown scenario ''"):
         load_scenario("")
@@ -115,7 +123,7 @@ def test_a_missing_file_is_named(tmp_path):
         (
             'vehicle = "s500_v2"',
             'vehicle = "s501"',
-            "uas[0].vehicle: unknown vehicle 's501'; take hexacopter, s500_v2 or the path of",
+            "uas[0].vehicle: unknown vehicle 's501'; take air_taxi, hexacopter, s500_v2 or the",
         ),
         ('vehicle = "s500_v2"', 'vehicle = "own.toml"', "uas[0].vehicle: no vehicle file at /"),
         (

@@ -8,7 +8,7 @@ from uas_coverage_env.planning.backup.course import Course
 from uas_coverage_env.vehicle.layout import DOD, N_STATES, VX, VZ
 
 NOWHERE, NONE = np.zeros((0, 3)), np.zeros(0)
-NOTHING = MovingObstacles(NOWHERE, NOWHERE, NONE, NONE, NONE, 1.0, 0)
+NOTHING = MovingObstacles(NOWHERE, NOWHERE, NONE, NONE, NONE, 1.0, 0, 0.0)
 
 
 def states_along(path_m, dod=0.1):

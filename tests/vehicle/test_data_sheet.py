@@ -55,6 +55,33 @@ SHEETS = {
         "top_speed_mps": 16.0,
         "charge_left": 0.2,
     },
+    "nano": S500
+    | {
+        "mass_kg": 0.034,
+        "diameter_in": 1.82,
+        "pitch_in": 1.0,
+        "cells": 1,
+        "capacity_Ah": 0.25,
+        "hover_minutes": 6.7,
+        "top_speed_mps": 10.0,
+        "speed_limit_mps": 1.5,
+        "arm_m": 0.046,
+        "tilt_deg": 20.0,
+        "auxiliary_W": 0.6,
+    },
+    "taxi": S500
+    | {
+        "mass_kg": 900.0,
+        "motors": 18,
+        "diameter_in": 90.5,
+        "pitch_in": 30.0,
+        "cells": 108,
+        "capacity_Ah": 110.0,
+        "hover_minutes": 18.0,
+        "top_speed_mps": 30.0,
+        "arm_m": 7.0,
+        "tilt_deg": 17.0,
+    },
     "tricopter": S500 | {"mass_kg": 1.2, "motors": 3, "cells": 3, "hover_minutes": 18.0},
 }
 
@@ -152,6 +179,54 @@ def test_a_name_may_hold_anything():
     assert made(name=name).vehicle.name == name
 
 
+def test_the_data_sheet_of_the_crazyflie_gives_the_shipped_file():
+    vehicle, shipped = make_vehicle(DataSheet(**SHEETS["nano"])).vehicle, load("crazyflie")
+    assert endurance(vehicle).hover_min == pytest.approx(endurance(shipped).hover_min, rel=0.03)
+    assert vehicle.power.hover_W == pytest.approx(shipped.power.hover_W, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "sheet",
+    [
+        {"mass_kg": 0.01, "diameter_in": 1.2, "pitch_in": 0.6, "cells": 1, "capacity_Ah": 0.08}
+        | {"hover_minutes": 12.0, "top_speed_mps": 5.0},
+        {"mass_kg": 5000.0, "motors": 32, "diameter_in": 120.0, "pitch_in": 40.0, "cells": 300}
+        | {"capacity_Ah": 500.0, "hover_minutes": 14.0, "top_speed_mps": 60.0},
+    ],
+)
+def test_vehicles_of_ten_grams_and_of_five_tonnes_can_be_made(sheet):
+    vehicle = made(**sheet).vehicle
+    compile_vehicle(vehicle, 0.2)
+    assert vehicle.weight_N == pytest.approx(9.81 * sheet["mass_kg"])
+
+
+def test_a_speed_limit_leaves_the_drag_as_it_is():
+    free, held = made(top_speed_mps=16.0).vehicle, made(top_speed_mps=16.0, speed_limit_mps=2.0)
+    assert held.vehicle.airframe == free.airframe
+    assert held.vehicle.limits.v_xy_max_mps == 2.0
+    assert held.vehicle.limits.v_cruise_mps < 2.0
+    assert held.vehicle.limits.v_up_max_mps <= 2.0
+
+
+def test_rates_follow_the_arm():
+    small = {"diameter_in": 5.0, "pitch_in": 2.25, "arm_m": 0.115, "hover_minutes": 9.0}
+    near, at, far = (
+        made(**changes).vehicle.limits for changes in (small, {"arm_m": 0.23}, {"arm_m": 0.8})
+    )
+    for key in ("angular_acceleration_xy_max_radps2", "angular_acceleration_z_max_radps2"):
+        assert getattr(near, key) == pytest.approx(2.0 * getattr(at, key), rel=1e-3)
+    assert near.rate_max_radps == pytest.approx(np.sqrt(2.0) * at.rate_max_radps, rel=1e-3)
+    assert far.rate_max_radps == at.rate_max_radps == 0.5
+    assert far.yaw_rate_max_radps < at.yaw_rate_max_radps == 0.35
+
+
+def test_the_way_home_is_a_share_of_the_endurance():
+    whole, half = made(), made(hover_minutes=20.0)
+    whole_s, half_s = (m.vehicle.return_rule.distance_over_speed_s for m in (whole, half))
+    assert whole_s == pytest.approx(180.0, rel=1e-3)
+    assert half_s == pytest.approx(whole_s * 20.0 / 22.9, rel=1e-3)
+
+
 MISTAKES = {
     "flies too long": (
         {"hover_minutes": 60.0},
@@ -164,6 +239,7 @@ MISTAKES = {
     "propeller is a screw": ({"pitch_in": 45.0}, r"10x45 in has a pitch of 4\.5 diameters"),
     "weak": ({"thrust_to_weight": 1.3, "tilt_deg": 45.0}, r"thrust_to_weight 1\.3 leaves no lift"),
     "weightless": ({"mass_kg": 0.0}, r"mass_kg: should be greater"),
+    "limited in vain": ({"speed_limit_mps": 13.0}, r"speed_limit_mps 13 is more than top_speed"),
     "two motors": ({"motors": 2}, r"motors: should be greater"),
     "tired battery": (
         {"hover_minutes": 13.0, "resistance_mohm": 120.0},

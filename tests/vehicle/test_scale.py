@@ -1,11 +1,12 @@
 """Lengths follow from how a fleet stops, and are those of the shipped vehicles for these."""
 
 import pytest
-from test_stopping import AIR_TAXI, CRAZYFLIE, flown_by
+from test_stopping import AIR_TAXI, CRAZYFLIE, flown_by, with_limits
 
 from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
 from uas_coverage_env.vehicle import load_vehicle
+from uas_coverage_env.vehicle.governor import time_scale
 from uas_coverage_env.vehicle.scale import braking_s, clock_reserve_s, length_scale
 from uas_coverage_env.vehicle.stopping import stopping_of
 from uas_coverage_env.world.obstacles import route_margin_m
@@ -26,8 +27,17 @@ def test_a_vehicle_that_stops_in_a_tenth_of_the_way_has_a_tenth_of_the_lengths(d
     ways_m = {n: stopping_of(load_vehicle(n), dt_s).way_m for n in (CRAZYFLIE, AIR_TAXI)}
     assert scale_of(CRAZYFLIE, dt_s=dt_s) == pytest.approx(ways_m[CRAZYFLIE] / 25.0)
     assert scale_of(AIR_TAXI, dt_s=dt_s) == pytest.approx(ways_m[AIR_TAXI] / 30.0)
-    assert 0.05 < scale_of(CRAZYFLIE, dt_s=dt_s) < 0.2
+    assert 0.02 < scale_of(CRAZYFLIE, dt_s=dt_s) < 0.1
     assert 5.0 < scale_of(AIR_TAXI, dt_s=dt_s) < 8.0
+
+
+def test_small_vehicles_have_a_quicker_loop_and_the_shipped_multirotors_the_one_they_had():
+    for name in ("s500_v2", "hexacopter", AIR_TAXI):
+        assert time_scale(load_vehicle(name)) == 1.0
+    assert 0.3 < time_scale(load_vehicle(CRAZYFLIE)) < 0.5
+    sluggish = with_limits(CRAZYFLIE, angular_acceleration_xy_max_radps2=1.25)
+    assert time_scale(load_vehicle(CRAZYFLIE)) < time_scale(sluggish) < 1.0
+    assert stopping_of(sluggish, 0.2).time_s > stopping_of(load_vehicle(CRAZYFLIE), 0.2).time_s
 
 
 def test_a_mixed_fleet_has_the_lengths_of_its_largest():

@@ -15,7 +15,7 @@ from uas_coverage_env.vehicle.stopping import AT_REST_MPS, stopping_of
 from uas_coverage_env.world import GoTo, Velocity
 
 VEHICLES = Path(__file__).parents[1] / "vehicles"
-CRAZYFLIE, AIR_TAXI = str(VEHICLES / "crazyflie.toml"), str(VEHICLES / "air_taxi.toml")
+CRAZYFLIE, AIR_TAXI = "crazyflie", str(VEHICLES / "air_taxi.toml")
 STEPS_S = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.3, 1.5, 1.7, 1.9, 2.0)
 
 

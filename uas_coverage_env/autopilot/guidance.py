@@ -28,10 +28,12 @@ from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.arena import Arena
 from uas_coverage_env.world.height import lowest_altitude
+from uas_coverage_env.world.obstacles import NODE_MARGIN_M
 from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, level_apart, route
 
 LEAD_S = 1.6
-"""The inner loop follows a velocity with about this delay; guidance steers from ahead [s]."""
+"""The inner loop follows a velocity with about this delay; guidance steers from ahead. At scale 1,
+as all times below, see `governor.time_scale` [s]."""
 
 CRUISE_ALTITUDE_M = 8.0
 """On a longer way UAS do not sink below this altitude above the floor, at scale 1 [m]."""
@@ -74,7 +76,7 @@ or a step, whichever is longer: a velocity held for a step moves that end on by 
 _WIND_TO_HURRY = 0.5
 """Of the highest airspeed: in a stronger wind a gust may take all of it, and braking takes longer
 than simulated. There, as in still air, a UAS comes home slowly [-]. Without it, 2 of 151 UAS were
-blown over the fence (docs/wind_method.md)."""
+blown over the fence (docs/wind_and_models.md)."""
 
 _AS_WISHED, _LEVEL, _IN_PLACE, _STRAIGHT_ON = range(4)
 
@@ -170,13 +172,13 @@ def _climb_on_leg(arena, i, x, x1, y1, altitude1_m, leg):
             roof_m = ceiling_m - headroom_m
         rise_m = roof_m - altitude_m
         if rise_m > 0.0:
-            climbing_s = rise_m / arena.uas[i].climb_mps + LEAD_S
+            climbing_s = rise_m / arena.uas[i].climb_mps + arena.uas[i].time_scale * LEAD_S
             speed_mps = min(speed_mps, at * length_m / climbing_s)
     return needed_m, speed_mps
 
 
 @kernel
-def _is_tight(arena, x, y):
+def is_tight(arena, x, y):
     """Whether a corner of routes lies in a gap that is little wider than what they keep."""
     n_near = 0
     for o in range(arena.obstacles.shape[0]):
@@ -186,6 +188,19 @@ def _is_tight(arena, x, y):
             away_m = signed_distance(arena.normals, arena.offsets_m, first, last, x, y, 0.0)
             n_near += away_m < arena.rules[0].length_scale * _TIGHT_M
     return n_near > 1
+
+
+@kernel
+def seconds_at_rest(arena, i):
+    """By how much longer a leg takes at the end of which a UAS comes to rest, and flies on [s].
+
+    At `_STOPPING_PER_S` it comes as near as corners lie to what routes avoid.
+    """
+    uas = arena.uas[i]
+    per_s = _STOPPING_PER_S / uas.time_scale
+    slowed_m = uas.speed_mps / per_s
+    near_m = arena.rules[0].length_scale * NODE_MARGIN_M
+    return max(math.log(slowed_m / near_m), 0.0) / per_s
 
 
 @inlined_kernel
@@ -205,13 +220,13 @@ def _passing_speed(arena, i, x, target, distance_m, altitude1_m):
     """Speed at which a waypoint is flown by, neither past a small sphere nor too high or low."""
     uas = arena.uas[i]
     radius_m = arena.waypoints[target].radius_m
-    passing_mps = min(_PASSING_SHARE * uas.speed_mps, _PASSING_PER_S * radius_m)
+    passing_mps = min(_PASSING_SHARE * uas.speed_mps, _PASSING_PER_S / uas.time_scale * radius_m)
     before_m = max(0.0, distance_m - arena.rules[0].length_scale * _SLOWED_M)
-    speed_mps = min(uas.speed_mps, passing_mps + _SLOWING_PER_S * before_m)
+    speed_mps = min(uas.speed_mps, passing_mps + _SLOWING_PER_S / uas.time_scale * before_m)
     missing_m = abs(altitude1_m + x[S.Z]) - _HEIGHT_SHARE * radius_m
     if missing_m > 0.0:
         rate_mps = uas.climb_mps if altitude1_m > -x[S.Z] else uas.descent_mps
-        climbing_s = missing_m / rate_mps + LEAD_S
+        climbing_s = missing_m / rate_mps + uas.time_scale * LEAD_S
         speed_mps = min(speed_mps, _CLIMBING_MPS + distance_m / climbing_s)
     return speed_mps
 
@@ -223,9 +238,10 @@ def _approach_speed(arena, i, x, target, stop, brakes_late, distance_m, leg, alt
     if brakes_late:
         return min(most_mps, _TO_HOME * distance_m / max(arena.rules[0].dt_s, 1.0))
     if stop:
-        return min(most_mps, _STOPPING_PER_S * distance_m)
+        return min(most_mps, _STOPPING_PER_S / arena.uas[i].time_scale * distance_m)
     if leg == ROUND_CORNER:
-        return min(most_mps, _CORNER_SHARE * most_mps + _CORNER_PER_S * distance_m)
+        per_s = _CORNER_PER_S / arena.uas[i].time_scale
+        return min(most_mps, _CORNER_SHARE * most_mps + per_s * distance_m)
     return _passing_speed(arena, i, x, target, distance_m, altitude1_m)
 
 
@@ -271,7 +287,7 @@ def _next_leg(arena, i, x, target, stop, belief, room):
         if beside_x != end_x or beside_y != end_y:
             end_x, end_y, leg = beside_x, beside_y, ROUND_CORNER
     if leg == ROUND_CORNER:
-        stop = _is_tight(arena, end_x, end_y)
+        stop = is_tight(arena, end_x, end_y)
     return end_x, end_y, -z1, way_m, leg, stop
 
 
@@ -339,10 +355,10 @@ def guide(
     """
     end_x, end_y, altitude1_m, way_m, leg, stop = _next_leg(arena, i, x, target, stop, belief, room)
     path_m = room.path_m
-    lead_s = LEAD_S
+    lead_s = arena.uas[i].time_scale * LEAD_S
     if not stop:
         left_m = math.hypot(end_x - x[S.X], end_y - x[S.Y])
-        lead_s = min(LEAD_S, _LEAD_SHARE * left_m / (math.hypot(x[S.VX], x[S.VY]) + _NOWHERE_M))
+        lead_s = min(lead_s, _LEAD_SHARE * left_m / (math.hypot(x[S.VX], x[S.VY]) + _NOWHERE_M))
     ahead_x = end_x - x[S.X] - lead_s * x[S.VX]
     ahead_y = end_y - x[S.Y] - lead_s * x[S.VY]
     brakes_late = _brakes_late(arena, i, belief, target, leg)

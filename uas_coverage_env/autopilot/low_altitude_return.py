@@ -19,7 +19,7 @@ from uas_coverage_env.world.routes import crossing
 
 LITTLE_MPS = 2.0
 """Headway below which a UAS flies low: of a wind that is known to about a metre per second. What
-flying low is worth: docs/wind_method.md."""
+flying low is worth: docs/wind_and_models.md."""
 
 _HERE_M = 2.0  # a place so near has been reached, at scale 1
 

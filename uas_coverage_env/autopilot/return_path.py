@@ -3,7 +3,13 @@
 import math
 
 from uas_coverage_env.autopilot.belief import estimated_speed, vertical_margin_mps
-from uas_coverage_env.autopilot.guidance import HEADROOM_M, passes_over, target_position
+from uas_coverage_env.autopilot.guidance import (
+    HEADROOM_M,
+    is_tight,
+    passes_over,
+    seconds_at_rest,
+    target_position,
+)
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.entities.commands import HOME
 from uas_coverage_env.entities.state import WIND
@@ -106,6 +112,9 @@ def _flight_from(arena, i, x0, y0, z0, away_mps, belief=None):
             more_s += _more_in_wind_s(arena, i, belief, end_x - here_x, end_y - here_y)
         if leg != ROUND_CORNER:
             break
+        # what such corners cost at scale 1 is in what was fitted
+        if arena.rules[0].length_scale < 1.0 and is_tight(arena, end_x, end_y):
+            more_s += seconds_at_rest(arena, i)
         flown_m += math.hypot(end_x - here_x, end_y - here_y)
         here_x, here_y = end_x, end_y
         end_x, end_y, leg = leg_from_corner(arena, row, here_x, here_y, z0, x1, y1, z1)

@@ -26,12 +26,14 @@ class Places(NamedTuple):
     Attributes:
         waypoints_m: (W, 2) [m].
         radii_m: (W,) [m].
+        starts_m: (U, 2) [m].
         homes_m: (U, 2) [m].
         landing_distance_m: [m].
     """
 
     waypoints_m: FloatArray
     radii_m: FloatArray
+    starts_m: FloatArray
     homes_m: FloatArray
     landing_distance_m: float
 
@@ -65,7 +67,7 @@ def legs_between(places: Places, reach_m: FloatArray, reach_from_rest_m: FloatAr
         reach_from_rest_m: (n+1,) the same from rest.
     """
     n, homes = len(places.waypoints_m), places.homes_m
-    centre_m = np.concatenate([places.waypoints_m, homes, homes])
+    centre_m = np.concatenate([places.waypoints_m, places.starts_m, homes])
     landing = np.full(len(homes), places.landing_distance_m)
     radius_m = np.concatenate([places.radii_m, np.zeros(len(homes)), landing])
     between_m = np.linalg.norm(centre_m[:n, None] - centre_m[None], axis=2)

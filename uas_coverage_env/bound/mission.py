@@ -208,7 +208,9 @@ def _places(scenario: Scenario) -> Places:
     """Waypoints that a UAS may touch while it stands or lands are left out: they may be free."""
     waypoints_m = np.array([one.position_m[:2] for one in scenario.waypoints]).reshape(-1, 2)
     radii_m = np.array([one.radius_m for one in scenario.waypoints])
-    homes_m = np.array([uas.start_m[:2] for uas in scenario.uas])
-    away_m = np.linalg.norm(waypoints_m[:, None] - homes_m, axis=2).min(axis=1)
+    starts_m = np.array([uas.start_m[:2] for uas in scenario.uas])
+    homes_m = np.array([uas.home_m[:2] for uas in scenario.uas])
+    ends_m = np.concatenate([starts_m, homes_m])
+    away_m = np.linalg.norm(waypoints_m[:, None] - ends_m, axis=2).min(axis=1)
     kept = away_m > radii_m + scenario.landing_distance_m
-    return Places(waypoints_m[kept], radii_m[kept], homes_m, scenario.landing_distance_m)
+    return Places(waypoints_m[kept], radii_m[kept], starts_m, homes_m, scenario.landing_distance_m)

@@ -46,6 +46,7 @@ def report_flight(screen: Console, flight: Flight, directory: Path) -> None:
         screen.print(line, markup=False, style="yellow")
     result = summary(flight)
     low = f", {flight.height_breaches} of them too low" if flight.height_breaches else ""
+    low += f", {n} below the reserve" if (n := flight.reserve_breaches) else ""
     steps = ", ".join(filter(None, (f"{flight.steps} steps", ENDED[flight.ended])))
     screen.print(
         f"covered {result['coverage']:.0%} in {steps}; "

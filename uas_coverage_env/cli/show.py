@@ -4,6 +4,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
@@ -24,6 +25,7 @@ from uas_coverage_env.cli.options import FlightDirectory, JsonOption, SecondFlig
 from uas_coverage_env.cli.output import console
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.figure import NOTHING
+from uas_coverage_env.flight.legs import legs_of
 from uas_coverage_env.flight.metrics import accomplished
 
 
@@ -35,6 +37,14 @@ def show(
         typer.Option(
             "--bound",
             help="Beside the least energy that the mission takes (10 to 30 s of processor time).",
+        ),
+    ] = False,
+    legs: Annotated[
+        bool,
+        typer.Option(
+            "--legs",
+            help="With each leg from a start by the covered waypoints to the landing: time, way, "
+            "energy, charge.",
         ),
     ] = False,
     as_json: JsonOption = False,
@@ -51,7 +61,7 @@ def show(
         with _stages() as say:
             bounds = [_bound(flight, say) for flight in flights]
     if as_json:
-        _print_json(flights, sources, bounds)
+        _print_json(flights, sources, bounds, legs=legs)
         return
     out = console()
     table = Table("", *sources, box=None)
@@ -71,6 +81,8 @@ def show(
         for row in by_uas(flight):
             each.add_row(*row)
         out.print(each)
+        if legs:
+            out.print(_leg_table(flight))
         for violation in flight.violations:
             out.print(f"violation: {violation}", markup=False)
         for line in (*failed_figures(flight), *of_log(flight)):
@@ -81,13 +93,32 @@ def show(
 
 
 def _print_json(
-    flights: list[Flight], sources: list[str], bounds: list[dict[str, Any] | None]
+    flights: list[Flight],
+    sources: list[str],
+    bounds: list[dict[str, Any] | None],
+    *,
+    legs: bool,
 ) -> None:
     entries = [
-        data(flight, source) | ({} if least is None else {"bound": least})
+        data(flight, source)
+        | ({} if least is None else {"bound": least})
+        | ({"legs": [asdict(leg) for leg in legs_of(flight)]} if legs else {})
         for flight, source, least in zip(flights, sources, bounds, strict=True)
     ]
     typer.echo(json.dumps(entries[0] if len(entries) == 1 else entries, indent=2))
+
+
+def _leg_table(flight: Flight) -> Table:
+    headings = ("UAS", "from", "to waypoint", "s", "m", "Wh", "charge", "at its end", "spare")
+    table = Table(*headings, box=None)
+    for leg in legs_of(flight):
+        ends = (place.removeprefix("waypoint ") for place in (leg.leaves, leg.reaches))
+        table.add_row(
+            *(leg.uas, *ends, f"{leg.ends_s - leg.begins_s:g}", f"{leg.way_m:.0f}"),
+            *(f"{leg.energy_Wh:.2f}", f"{leg.soc_begins:.1%}", f"{leg.soc_ends:.1%}"),
+            f"{leg.above_reserve:.1%}",
+        )
+    return table
 
 
 @contextmanager

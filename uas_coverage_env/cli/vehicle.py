@@ -85,6 +85,9 @@ class Asked:
     resistance_mohm: Annotated[float | None, typer.Option(help="Of the battery.")] = None
     climb_mps: Annotated[float | None, typer.Option(help="Fastest climb.")] = None
     descent_mps: Annotated[float | None, typer.Option(help="Fastest descent.")] = None
+    speed_limit_mps: Annotated[
+        float | None, typer.Option(help="Flown at the most; default: the top speed.")
+    ] = None
     name: Annotated[str | None, typer.Option(help="Of the vehicle; default: the file's.")] = None
     overwrite: ReplaceFileOption = False
 

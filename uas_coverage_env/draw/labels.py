@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 
 _TRIED = 15
 
+_LOW_M = 10.0  # heights of what is no higher have decimals
+
 Box = tuple[float, float, float, float]
 """Left, least height, width, height."""
 
@@ -15,6 +17,11 @@ def overlap(box: Box, other: Box) -> bool:
         box[axis] < other[axis] + other[axis + 2] and other[axis] < box[axis] + box[axis + 2]
         for axis in (0, 1)
     )
+
+
+def metres(value_m: float, most_m: float) -> str:
+    """A height in words, with as many decimals as it takes where none is more than `most_m`."""
+    return f"{value_m:.{int(most_m < _LOW_M)}f}"
 
 
 def short_name(name: str) -> str:

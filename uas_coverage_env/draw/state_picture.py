@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import colours, marks
 from uas_coverage_env.draw.canvas import Canvas
 from uas_coverage_env.draw.frame import Frame
-from uas_coverage_env.draw.labels import Box, overlap, short_name
+from uas_coverage_env.draw.labels import Box, metres, overlap, short_name
 from uas_coverage_env.draw.terrain import terrain
 from uas_coverage_env.draw.text import fitted, width_of, write
 from uas_coverage_env.entities.state import FLYING, LANDED, STATUS_NAMES
@@ -270,7 +270,8 @@ class Picture:
             words = f"{fitted(name, size, room_for_name)}  {100 * (1 - swarm.x[i, DOD]):.0f} %"
             if frame.detailed:
                 status = swarm.status[i]
-                doing = f"{-swarm.x[i, Z]:.0f} m" if status == FLYING else STATUS_NAMES[status]
+                high = metres(-swarm.x[i, Z], frame.ceiling_m - frame.floor_m)
+                doing = f"{high} m" if status == FLYING else STATUS_NAMES[status]
                 words += f", {doing}"
             write(image, (x + 11 * unit, y), words, size, colours.INK)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.draw import colours, marks
 from uas_coverage_env.draw.frame import Frame
-from uas_coverage_env.draw.labels import free_place
+from uas_coverage_env.draw.labels import free_place, metres
 from uas_coverage_env.draw.text import fitted, width_of, write
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.geometry.outline import outline_of
@@ -22,6 +22,7 @@ _LIGHT = np.array([0.45, -0.45, -0.77])
 # Metres of shadow per metre of height, towards the south-east.
 _SHADOW = np.array([-0.32, 0.32])
 _TALL_M = 50.0
+_OVERHEAD_M = 1.0  # under what hangs higher, one walks
 # Sum of red, green and blue below which dark words cannot be read.
 _DARK = 400
 # Of the letters of heights, in pixels of the design.
@@ -48,16 +49,41 @@ def terrain(scenario: Scenario, frame: Frame) -> "Image":
         draw.polygon(corners, fill=fill)
         if decoration.kind == "pad":
             draw.line([*corners, *corners[:2]], fill=colours.FAINT, width=round(frame.unit))
-    _shadows(image, frame, scenario.hulls)
+    overhead = lintels(scenario)
+    if not is_plan(scenario):
+        _shadows(image, frame, scenario.hulls)
     places = height_places(scenario, frame)
-    for obstacle, hull, place in zip(scenario.obstacles, scenario.hulls, places, strict=True):
-        _obstacle(image, draw, frame, obstacle.kind or "", hull, place)
+    for o, (obstacle, hull, place) in enumerate(
+        zip(scenario.obstacles, scenario.hulls, places, strict=True)
+    ):
+        if overhead[o]:
+            edge = outline_of(hull.vertices_m)
+            edge = _flat(frame.pixels(np.vstack([edge, edge[:1]])))
+            draw.line(edge, fill=colours.FAINT, width=round(frame.unit))
+        else:
+            words = height_words(hull, scenario.fence)
+            _obstacle(image, draw, frame, obstacle.kind or "", hull, words, place)
     edge = _flat(frame.pixels(np.vstack([fence, fence[:2]])))
     draw.line(edge, fill=colours.INK, width=round(1.5 * frame.unit), joint="curve")
     _scale_and_north(image, draw, frame, fence)
-    _pads(draw, frame, np.array([uas.start_m for uas in scenario.uas]))
+    _pads(draw, frame, np.array([(uas.start_m, uas.home_m) for uas in scenario.uas]).reshape(-1, 3))
     _margins(image, draw, frame, scenario.name)
     return image
+
+
+def is_plan(scenario: Scenario) -> bool:
+    """Whether it is drawn as the plan of a building, so that doors are seen: without shadows."""
+    return scenario.planar is not None or bool(scenario.doors_m)
+
+
+def lintels(scenario: Scenario) -> list[bool]:
+    """Of each obstacle, whether a plan shows its outline alone: what hangs above a doorway."""
+    ground_m = float(scenario.fence.vertices_m[:, 2].max())
+    plan = is_plan(scenario)
+    return [
+        plan and ground_m - float(hull.vertices_m[:, 2].max()) > _OVERHEAD_M
+        for hull in scenario.hulls
+    ]
 
 
 def height_places(scenario: Scenario, frame: Frame) -> list[tuple[float, float] | None]:
@@ -69,7 +95,7 @@ def height_places(scenario: Scenario, frame: Frame) -> list[tuple[float, float] 
     return [
         free_place(
             frame.pixels(outline_of(hull.vertices_m)),
-            np.array([width_of(height_words(hull), size), size]) + frame.unit,
+            np.array([width_of(height_words(hull, scenario.fence), size), size]) + frame.unit,
             discs,
         )
         for hull in scenario.hulls
@@ -131,11 +157,12 @@ def _obstacle(
     frame: Frame,
     kind: str,
     hull: ConvexPolytope,
+    words: str,
     place: tuple[float, float] | None,
 ) -> None:
     """The faces that can be seen from above, lit, in the tint of the kind; darker where taller.
 
-    Its height stands at `place`.
+    Its height, in `words`, stands at `place`.
     """
     height_m = float(np.ptp(hull.vertices_m[:, 2]))
     tint = colours.of_obstacle(kind)
@@ -151,16 +178,17 @@ def _obstacle(
     draw.line(edge, fill=colours.shaded(tint, 0.55), width=width, joint="curve")
     ink = colours.WHITE if sum(tint) < _DARK else colours.shaded(tint, 0.35)
     if place is not None:
-        write(image, place, height_words(hull), _HEIGHT * frame.letter, ink, align=0.5)
+        write(image, place, words, _HEIGHT * frame.letter, ink, align=0.5)
 
 
-def height_words(hull: ConvexPolytope) -> str:
-    """How high an obstacle is, as it stands on maps."""
-    return f"{np.ptp(hull.vertices_m[:, 2]):.0f} m"
+def height_words(hull: ConvexPolytope, fence: ConvexPolytope) -> str:
+    """How high an obstacle is, as it stands on maps of what a fence is around."""
+    height_m, most_m = (float(np.ptp(body.vertices_m[:, 2])) for body in (hull, fence))
+    return f"{metres(height_m, most_m)} m"
 
 
-def _pads(draw: "ImageDraw", frame: Frame, starts_m: NDArray[np.float64]) -> None:
-    for x, y in frame.pixels(starts_m).tolist():
+def _pads(draw: "ImageDraw", frame: Frame, pads_m: NDArray[np.float64]) -> None:
+    for x, y in np.unique(frame.pixels(pads_m), axis=0).tolist():
         marks.pad(draw, frame, x, y)
 
 
@@ -176,7 +204,8 @@ def _margins(image: "Image", draw: "ImageDraw", frame: Frame, name: str) -> None
     for altitude_m in np.linspace(frame.floor_m, frame.ceiling_m, 6).tolist():
         y = frame.gauge_height(altitude_m)
         draw.line((x, y, x + 4 * unit, y), fill=colours.FAINT, width=round(unit))
-        write(image, (x + 7 * unit, y), f"{altitude_m:.0f}", 9 * frame.letter, colours.FAINT)
+        words = metres(altitude_m, frame.ceiling_m - frame.floor_m)
+        write(image, (x + 7 * unit, y), words, 9 * frame.letter, colours.FAINT)
     write(image, (x - 4 * unit, top - 12 * unit), "alt [m]", 9 * frame.letter, colours.FAINT)
 
 

@@ -34,11 +34,13 @@ OUTCOME_DTYPE = record_dtype(
         # a code of this module, and the index of the obstacle or UAS, or -1
         ("contact", "i8"),
         ("contact_with", "i8"),
-        # how many obstacles and UAS are too near at the new sample; the fence
-        # and the least height count too
+        # how many obstacles and UAS are too near at the new sample; the fence, the least height
+        # and a landing with less than the reserve count too
         ("breaches", "i8"),
         # one of these: below the least height
         ("too_low", "?"),
+        # another: it has landed with less charge than the reserve
+        ("below_reserve", "?"),
         # the vehicle's limits exceeded at the new sample: bit k for `vehicle.LIMITS[k]`
         ("limits_exceeded", "i8"),
         # smallest over the segment flown; inf where there is nothing to be clear of, or

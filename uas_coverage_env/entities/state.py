@@ -171,7 +171,7 @@ class SwarmState:
         departed: (U,) has been farther from its start than the landing distance.
         returning: (U,) return mode has it now: commands are replaced by the way home.
         uncovered: (W,) waypoint still to be covered.
-        home_m: (U, 3) [m] the starts.
+        home_m: (U, 3) [m] where they land.
         moving_position_m: (M, 3) [m] centres of moving obstacles, now.
         moving_velocity_mps: (M, 3) [m/s] their velocities, now.
         responds: (U,) takes commands now; not without its radio, nor before a late start.

@@ -158,7 +158,8 @@ def parse(data: Mapping[str, Any], model: type[M], source: str, *, context: Any 
         if problems:
             raise _first_of(problems, source)
         # JSON, because pydantic's strict mode takes a JSON array for a tuple, but no Python list
-        text = json.dumps(data, default=dict)
+        complete = getattr(model, "completed", None)
+        text = json.dumps(complete(data) if complete else data, default=dict)
         return model.model_validate_json(text, strict=True, context=context)
     except RecursionError:
         raise _error(source, "keys are nested too deeply; flatten the tables") from None

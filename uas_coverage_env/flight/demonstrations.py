@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.entities.state import FLYING
+from uas_coverage_env.env.actions.in_plane import kind_in
 from uas_coverage_env.env.actions.velocity import VELOCITY
 from uas_coverage_env.env.actions.waypoint import HOME_CHOICE
 from uas_coverage_env.env.observation import OBSERVATION
@@ -187,10 +188,11 @@ def _rows_of(
     offered = candidates[flies] >= 0
     wanted = next_covered[flies, None]
     is_next = (candidates[flies] == wanted) & offered
+    kind = kind_in(VELOCITY, scenario)
     choice = np.where(is_next.any(axis=1), is_next.argmax(axis=1), UNKNOWN_CHOICE)
     return {
         "observation": observation[flies],
-        "velocity": _shares(VELOCITY.scaled_to(scenario)[flies], asked),
+        "velocity": _shares(kind.scaled_to(scenario)[flies], asked[:, : kind.size]),
         "choice": np.where(wanted[:, 0] < 0, HOME_CHOICE, choice),
         "choice_mask": np.column_stack([offered, np.ones(len(flies), np.bool_)]),
         "reward": paid[flies],

@@ -14,6 +14,7 @@ from typing import Any
 from uas_coverage_env.files.output_dir import prepare_folder, write_files
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight.figures import summary
+from uas_coverage_env.flight.legs import Leg, legs_of
 from uas_coverage_env.flight.of_log import STATES
 from uas_coverage_env.flight.record import MODES, FlightRecord
 from uas_coverage_env.scenario import Scenario
@@ -31,6 +32,7 @@ FLIGHT_COLUMNS = (
 )
 MOVING_COLUMNS = ("t_s", "name", "x_m", "y_m", "z_m")
 PLAN_COLUMNS = ("t_s", "uas", "n", "x_m", "y_m", "z_m")
+LEG_COLUMNS = tuple(field.name for field in dataclasses.fields(Leg))
 REWARD_FILE = "rewards.csv"
 REWARD_COLUMNS = ("t_s", "uas")
 """Then one for each term."""
@@ -71,6 +73,7 @@ def flight_files(flight: FlightRecord) -> dict[str, bytes]:
         "flight.csv": _csv(FLIGHT_COLUMNS, _flight_rows(flight, times)),
         "moving_obstacles.csv": _csv(MOVING_COLUMNS, _moving_rows(flight, times)),
         "plan.csv": _csv(PLAN_COLUMNS, _plan_rows(flight, times)),
+        "legs.csv": _csv(LEG_COLUMNS, map(dataclasses.astuple, legs_of(flight))),
         **_reward_file(flight, times),
         **_pass_file(flight),
         "run.json": _json(_run(flight)),

@@ -243,11 +243,16 @@ FIGURES = (
            "and figures; absent where everything is covered, and of logs",
            text=metrics.reasons_left_open, optional=True),
     Figure("breaches", int, attrgetter("breaches"),
-           "samples closer than the safe distances, or below the least height",
+           "samples closer than the safe distances, or below the least height; landings with less "
+           "charge than the reserve",
            absent=0, over="total", table="outcome"),
     Figure("height_breaches", int, metrics.height_breaches,
            "how many of these are below the least height; absent where the scenario has none",
            "of them too low", optional=True, absent=0, over="total", table=""),
+    Figure("reserve_breaches", int, metrics.reserve_breaches,
+           "how many are landings below the [reserve](rules.md#reserve); absent where the scenario "
+           "has none",
+           "of them below the reserve", optional=True, absent=0, over="total", table=""),
     Figure("wall_time_s", float, attrgetter("wall_time_s"),
            "what the flight took to compute, without compilation", shown=False, table="",
            repeats=False),

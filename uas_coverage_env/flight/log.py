@@ -154,6 +154,9 @@ class FlightLog:
             "violations": tuple(self._violations()),
             "breaches": sum(int(step.outcome["breaches"].sum()) for step in self._steps),
             "height_breaches": sum(int(step.outcome["too_low"].sum()) for step in self._steps),
+            "reserve_breaches": sum(
+                int(step.outcome["below_reserve"].sum()) for step in self._steps
+            ),
             "events": self._events(),
             "swaps": tuple(self._swaps()),
             "reward_terms": self._reward_terms(),

@@ -203,6 +203,11 @@ def height_breaches(flight: FlightRecord) -> int | None:
     return flight.height_breaches if flight.scenario.min_height_m else None
 
 
+def reserve_breaches(flight: FlightRecord) -> int | None:
+    """Landings with less charge than the reserve; None where there is none."""
+    return flight.reserve_breaches if flight.scenario.reserve else None
+
+
 def n_fallbacks(flight: FlightRecord) -> int:
     """Decisions flown on a fallback."""
     return sum(decision.fallback for decision in flight.decisions)

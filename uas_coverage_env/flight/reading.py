@@ -94,6 +94,7 @@ class _Summary(StrictModel):
     not_known: tuple[UnknownEntry, ...] = ()
     breaches: Count
     height_breaches: Count = 0
+    reserve_breaches: Count = 0
     min_separation_m: float | None
     min_obstacle_clearance_m: float | None
     wall_time_s: Seconds

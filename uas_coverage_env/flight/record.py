@@ -236,12 +236,14 @@ class FlightRecord:
         plan: PLAN_DTYPE rows of what the planner predicted; empty where it does not predict.
         decisions: One entry per step.
         violations: Contacts and limits exceeded, in order of time.
-        breaches: Count of samples closer than the safe distances, or below the least height.
+        breaches: Count of samples closer than the safe distances or below the least height, and of
+            landings with less charge than the reserve.
         min_separation_m: Smallest distance between two flying UAS [m]; None: never two.
         min_obstacle_clearance_m: Smallest clearance from any obstacle [m]; None: no obstacle.
         wall_time_s: Time the flight took to compute [s], compilation apart.
         versions: Package -> version.
         height_breaches: How many of the breaches are below the least height.
+        reserve_breaches: How many are landings with less charge than the reserve.
         events: What has happened, in order of time; none where the scenario has no events.
         swaps: Of battery packs while the others flew on, in order of time.
         open_waypoints: How many were still to be covered at the end, where the scenario has events;
@@ -279,6 +281,7 @@ class FlightRecord:
     wall_time_s: float
     versions: Mapping[str, str]
     height_breaches: int = 0
+    reserve_breaches: int = 0
     events: tuple[EventRecord, ...] = ()
     swaps: tuple[Swap, ...] = ()
     open_waypoints: int | None = None

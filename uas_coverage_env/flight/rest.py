@@ -24,8 +24,8 @@ def rest_of(flight: FlightRecord, *, from_here: bool = False, name: str | None =
     Args:
         flight: The flight, simulated or from a log, whole or broken off.
         from_here: UAS in the air go on from where they were, with the charge that they had, and
-            land where they had started: their homes move there in the first step (`home_closed`).
-            Otherwise all are at home with fresh packs, and moving obstacles begin anew.
+            land where they were to. Otherwise all are at home with fresh packs, and moving
+            obstacles begin anew.
         name: Of the scenario; None: that of the flight with `-rest`.
 
     Raises:
@@ -46,10 +46,11 @@ def rest_of(flight: FlightRecord, *, from_here: bool = False, name: str | None =
     data["waypoints"] = [data["waypoints"][w] for w in np.flatnonzero(open_)]
     data["uas"] = [data["uas"][i] for i in alive]
     data.pop("events", None)
+    for entry in data["uas"]:
+        entry["start_m"] = entry.pop("land_m", entry["start_m"])
     if from_here:
-        data["events"] = []
         for entry, i in zip(data["uas"], alive.tolist(), strict=True):
-            data["events"] += _moved_here(entry, flight, i)
+            _move_here(entry, flight, i)
         data.pop("from_ground", None)  # the start of one that flies is not above its ground
         time_s = float(flight.time_s[-1])
         data["moving_obstacles"] = [
@@ -61,21 +62,12 @@ def rest_of(flight: FlightRecord, *, from_here: bool = False, name: str | None =
     return parse(data, Scenario, f"the rest of {began.name!r}")
 
 
-def _moved_here(entry: dict[str, Any], flight: FlightRecord, i: int) -> list[dict[str, Any]]:
-    """Put a UAS where it was with what it had; the event that gives it its home back, if any."""
+def _move_here(entry: dict[str, Any], flight: FlightRecord, i: int) -> None:
+    """Put a UAS where it was with what it had; it lands where it was to."""
     entry["soc_0"] = float(flight.soc[-1, i])
-    if flight.mode[-1, i] == LANDED:
-        return []
-    home_m = entry["start_m"]
-    entry["start_m"] = flight.x[-1, i, :3].tolist()
-    return [
-        {
-            "kind": "home_closed",
-            "at_s": flight.scenario.dt_s,
-            "uas": entry["name"],
-            "alternative_m": home_m,
-        }
-    ]
+    if flight.mode[-1, i] != LANDED:
+        entry["land_m"] = entry["start_m"]
+        entry["start_m"] = flight.x[-1, i, :3].tolist()
 
 
 def _from_then(

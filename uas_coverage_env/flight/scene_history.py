@@ -241,7 +241,7 @@ def _flying(flight: FlightRecord) -> NDArray[np.bool_]:
 def _homes_m(changes: Sequence[tuple[int, Scenario]], samples: int) -> NDArray[np.float64]:
     homes_m = np.empty((samples, len(changes[0][1].uas), 3))
     for since, scenario in changes:
-        homes_m[since:] = [uas.start_m for uas in scenario.uas]
+        homes_m[since:] = [uas.home_m for uas in scenario.uas]
     return homes_m
 
 

@@ -133,7 +133,7 @@ def partners_of(record: FlightRecord, row: int) -> Iterator[Partner]:
 
 
 def too_low(scenario: dict[str, Any], track: Track) -> NDArray[np.int64]:
-    """Steps after which a UAS is below the least height and not near its start."""
+    """Steps after which a UAS is below the least height and near neither its start nor its home."""
     least = scenario.get("min_height_m", 0.0)
     position = track.position_m[1:]
     low = -position[:, 2] < least - 1e-9
@@ -143,8 +143,10 @@ def too_low(scenario: dict[str, Any], track: Track) -> NDArray[np.int64]:
         normals, offsets = faces(points - centre)
         pushed_up = offsets - least * np.maximum(0.0, -normals[:, 2])
         low |= ((position - centre) @ normals.T + pushed_up).max(axis=1) < -1e-9
-    away = np.hypot(*(position - np.array(track.entry["start_m"]))[:, :2].T)
-    return np.flatnonzero(low & (away > scenario["landing_distance_m"] + 2.0 * least))
+    for place_m in (track.entry["start_m"], track.home_m):
+        away = np.hypot(*(position - np.array(place_m))[:, :2].T)
+        low &= away > scenario["landing_distance_m"] + 2.0 * least
+    return np.flatnonzero(low)
 
 
 def on_segments(partner: Partner, track: Track) -> FloatArray:

@@ -21,7 +21,7 @@ from uas_coverage_env.independent_check.distances import (
     scheduled,
     too_low,
 )
-from uas_coverage_env.independent_check.limits import inputs_beyond, limits_exceeded
+from uas_coverage_env.independent_check.limits import dod_landed, inputs_beyond, limits_exceeded
 from uas_coverage_env.independent_check.record import (
     BadFlightError,
     FlightRecord,
@@ -50,8 +50,10 @@ class Report:
         all_home: Whether every UAS has landed.
         contacts: (time [s], UAS, kind, with whom), straight from sample to sample.
         limits: (first time [s], UAS, `limit`, which) of the vehicle's limits exceeded.
-        breaches: Samples closer than the safe distances, or below the least height.
+        breaches: Samples closer than the safe distances or below the least height, and landings
+            with less charge than the reserve.
         height_breaches: How many of these are below the least height.
+        reserve_breaches: How many are landings with less charge than the reserve.
         straight_room_m: Kind -> smallest distance left before a contact, straight segments.
         curved_room_m: The same on the cubic curve through positions and velocities.
         disagreements: What the flight or its summary says and the check does not, and what does not
@@ -67,6 +69,7 @@ class Report:
     limits: list[tuple[float, str, str, str]] = field(default_factory=list)
     breaches: int = 0
     height_breaches: int = 0
+    reserve_breaches: int = 0
     straight_room_m: dict[str, float] = field(default_factory=dict)
     curved_room_m: dict[str, float] = field(default_factory=dict)
     disagreements: list[str] = field(default_factory=list)
@@ -142,7 +145,11 @@ def _judge_distances(record: FlightRecord, report: Report) -> None:
             report.breaches += len(set(close.tolist()) - gone)
         low = len(set(too_low(record.scenario, track).tolist()) - set(touched[row]))
         report.height_breaches += low
-        report.breaches += low
+        short = int(
+            (track.columns["dod"][track.landings] > dod_landed(record.scenario, track)).sum()
+        )
+        report.reserve_breaches += short
+        report.breaches += low + short
     _compare_smallest(record.summary, smallest, report)
 
 
@@ -294,11 +301,11 @@ def _oddities(track: Track, record: FlightRecord) -> Iterator[str]:
         capacity_As = drawn.sum() / max(gained.sum(), 1e-12)
         if np.abs(gained - drawn / capacity_As).max() > _SAME:
             yield "has a current that does not explain its depth of discharge"
-    home_m = np.linalg.norm(track.position_m - track.entry["start_m"], axis=1)
+    home_m = np.linalg.norm(track.position_m - track.home_m, axis=1)
     near = home_m <= scenario["landing_distance_m"]
     slow = np.linalg.norm(track.velocity_mps, axis=1) < scenario["landing_speed_mps"] - _ROUNDING
     if track.end == "landed" and home_m[-1] > scenario["landing_distance_m"] + _ROUNDING:
-        yield f"has landed {home_m[-1]:.3g} m from its start"
+        yield f"has landed {home_m[-1]:.3g} m from its home"
     if track.end in ("landed", "lost"):
         last = [column[name][-1] for name in ("current_A", "lift_N", "tau_x_Nm", "tau_y_Nm")]
         if np.any(last):
@@ -312,7 +319,7 @@ def _oddities(track: Track, record: FlightRecord) -> Iterator[str]:
             yield "is home and slow but has not landed"
     for landed, took_off in track.swaps:
         if home_m[landed] > scenario["landing_distance_m"] + _ROUNDING:
-            yield f"swaps its pack {home_m[landed]:.3g} m from its start"
+            yield f"swaps its pack {home_m[landed]:.3g} m from its home"
         if (took_off - landed) * record.dt_s < scenario["sorties"]["swap_s"] - _ROUNDING:
             yield "swaps its pack faster than the scenario allows"
     if len(track.swaps) >= scenario.get("sorties", {"packs": 1})["packs"]:
@@ -361,7 +368,7 @@ def _compare(summary: dict[str, Any], report: Report) -> None:
         mine = getattr(report, key)
         if not abs(mine - summary[key]) <= tolerance:
             report.disagreements.append(f"{key} is {mine}, the summary says {summary[key]}")
-    for key in ("all_home", "breaches", "height_breaches"):
+    for key in ("all_home", "breaches", "height_breaches", "reserve_breaches"):
         mine, theirs = getattr(report, key), summary.get(key, 0)
         if mine != theirs:
             report.disagreements.append(f"{key} is {mine}, the summary says {theirs}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,20 @@ def inputs_beyond(track: Track) -> str | None:
                 f"has {name} = {values[beyond[0]]:.4g}, beyond its limits {low:.4g} to {high:.4g}"
             )
     return None
+
+
+def dod_landed(scenario: dict[str, Any], track: Track) -> float:
+    """Depth of discharge with which a UAS lands at the latest, by the scenario's reserve."""
+    reserve, most = scenario.get("reserve", {}), track.entry["dod_max"]
+    if "minutes" not in reserve:
+        return min(1.0 - reserve.get("share", 0.0), most)
+    battery, hover_W = track.vehicle["battery"], track.vehicle["power"]["hover_W"]
+    open_V = np.interp(most, battery["ocv_dod"], battery["ocv_V"])
+    pairs = [battery["resistance_th_ohm"], *(p["resistance_ohm"] for p in battery.get("rc", ()))]
+    resistance_ohm = battery["resistance_0_ohm"] + sum(pairs)
+    root_V = np.sqrt(open_V**2 - 4.0 * resistance_ohm * hover_W)
+    current_A = (open_V - root_V) / (2.0 * resistance_ohm)
+    return float(most - reserve["minutes"] * current_A / (60.0 * battery["capacity_Ah"]))
 
 
 def _shares(track: Track, body_rates: bool) -> dict[str, FloatArray]:

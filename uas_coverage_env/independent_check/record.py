@@ -71,6 +71,16 @@ class Track:
         return self.entry["name"]
 
     @property
+    def landings(self) -> list[int]:
+        """The samples at which it has landed."""
+        return [*(landed for landed, _ in self.swaps), *([-1] if self.end == "landed" else [])]
+
+    @property
+    def home_m(self) -> list[float]:
+        """(3,) where it lands [m]."""
+        return self.entry.get("land_m", self.entry["start_m"])
+
+    @property
     def position_m(self) -> FloatArray:
         """(n, 3) [m]."""
         return self._stack("x_m", "y_m", "z_m")

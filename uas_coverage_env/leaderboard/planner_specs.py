@@ -2,13 +2,15 @@
 
 import itertools
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Planner, load_planner
 from uas_coverage_env.flight.registry import options_of
+from uas_coverage_env.leaderboard.hashing import source_hash
 
 _NO_LABEL = re.compile(r"[^\w.+-]")
 _LABELLED = re.compile(r"([\w.+-]+)=(.+)", re.DOTALL)
@@ -24,6 +26,8 @@ class PlannerSpec:
         options: Every option, defaults filled in, as plain data.
         fingerprint: Changes with the data it flies by (a policy's weights); empty where none.
         package: The package that its code is in.
+        own_sha256: Hash of the user's own modules that it flies by (MODULE:CLASS of planner and
+            options): an edited planner is another one. Empty where there are none.
     """
 
     label: str
@@ -31,6 +35,7 @@ class PlannerSpec:
     options: Mapping[str, Any]
     fingerprint: str
     package: str
+    own_sha256: str = field(default="", kw_only=True)
 
     @classmethod
     def named(cls, label: str, planner: str, options: Mapping[str, str] | None = None) -> Self:
@@ -40,12 +45,14 @@ class PlannerSpec:
             InputError: An unknown planner or option.
         """
         made = load_planner(planner, options)
+        all_options = options_of(made)
         return cls(
             label,
             planner,
-            options_of(made),
+            all_options,
             fingerprint=getattr(made, "fingerprint", ""),
             package=type(made).__module__.partition(".")[0],
+            own_sha256=_own_sha256(planner, all_options),
         )
 
     def identity(self) -> dict[str, Any]:
@@ -56,6 +63,7 @@ class PlannerSpec:
             "planner": planner,
             "options": dict(self.options),
             "fingerprint": self.fingerprint,
+            **({"own_sha256": self.own_sha256} if self.own_sha256 else {}),
         }
 
     def load(self) -> Planner:
@@ -65,9 +73,18 @@ class PlannerSpec:
             InputError: It cannot be made, or flies by other data by now.
         """
         planner = load_planner(self.planner, self.options)
-        if getattr(planner, "fingerprint", "") != self.fingerprint:
+        now = getattr(planner, "fingerprint", ""), _own_sha256(self.planner, self.options)
+        if now != (self.fingerprint, self.own_sha256):
             raise InputError(f"{self.label}: its files have changed since the sweep has begun")
         return planner
+
+
+def _own_sha256(planner: str, options: Mapping[str, Any]) -> str:
+    listed = [value if isinstance(value, list) else [value] for value in options.values()]
+    named = [str(text).partition(":") for text in itertools.chain([planner], *listed)]
+    modules = {name.partition(".")[0] for name, colon, _ in named if colon and name in sys.modules}
+    own = {name for name in modules if not name.startswith("uas_coverage_")}
+    return source_hash(own) if own else ""
 
 
 def planner_specs_of(

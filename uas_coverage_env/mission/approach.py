@@ -56,6 +56,8 @@ def _free_aim_m(brief: MissionBrief, waypoint: int) -> FloatArray:
         for normal, offset_m in zip(brief.fence.normals, brief.fence.offsets_m, strict=True):
             beyond_m = float(normal @ aim_m) + offset_m + fence_m
             aim_m -= max(beyond_m, 0.0) * normal
+        if brief.planar is not None:
+            aim_m[2] = centre_m[2]
         if (moved_m := float(np.linalg.norm(aim_m - centre_m))) > most_m:
             aim_m = centre_m + (aim_m - centre_m) * (most_m / moved_m)
         if np.abs(aim_m - before_m).max() < 1e-6:

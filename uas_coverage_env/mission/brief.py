@@ -25,6 +25,8 @@ from uas_coverage_env.scenario import (
 )
 from uas_coverage_env.scenario.conditions import Conditions
 from uas_coverage_env.scenario.payload import who_covers
+from uas_coverage_env.scenario.planar import Planar
+from uas_coverage_env.scenario.reserve import LandingReserve
 from uas_coverage_env.vehicle import VehicleParams
 
 
@@ -61,14 +63,16 @@ class MissionBrief(StrictModel):
         name: Name of the scenario.
         dt_s: Length of a time step [s].
         max_steps: Steps after which a flight ends.
-        landing_distance_m: A UAS this close to its start can land [m].
+        landing_distance_m: A UAS this close to its home can land [m].
         landing_speed_mps: ... when it is slower than this [m/s].
         uas_safe_distance_m: Kept between two UAS in addition to their radii [m].
         min_height_m: Least height above the ground and above roofs; 0: no such rule [m].
         route_margin_m: What routes keep beyond what counts as a breach; None: derived [m].
         from_ground: Whether charge is drawn for take-off before t = 0, and for landing at the end.
+        planar: The height at which all UAS fly; None where they fly in space.
         geofence: The volume to stay in.
         obstacles: Fixed obstacles.
+        doors_m: Middles of openings at which routes may turn, (D, 2) [m].
         moving_obstacles: Moving obstacles, without their schedules.
         uas: The fleet, with home positions and charge at t = 0.
         vehicles: The vehicle of each UAS, in their order.
@@ -80,6 +84,7 @@ class MissionBrief(StrictModel):
         execution: What flies it in the end, and how exactly; None where the scenario does not say.
         sorties: Packs of each UAS, and how long swapping takes. They are swapped in this flight
             where `together` is false; otherwise the brief is that of one sortie. None: one pack.
+        reserve: Charge with which UAS land at the latest; None: what `dod_max` leaves.
     """
 
     schema_version: int
@@ -98,11 +103,14 @@ class MissionBrief(StrictModel):
     vehicles: tuple[VehicleParams, ...]
     waypoints: tuple[Waypoint, ...]
     decorations: tuple[Decoration, ...]
+    planar: Planar | None = None
+    doors_m: tuple[tuple[float, float], ...] = ()
     place: Place | None = None
     route_margin_m: float | None = None
     conditions: Conditions | None = None
     execution: Execution | None = None
     sorties: Sorties | None = None
+    reserve: LandingReserve | None = None
 
     if not TYPE_CHECKING:
 
@@ -145,6 +153,11 @@ class MissionBrief(StrictModel):
     def kept_hulls(self) -> tuple[ConvexPolytope, ...]:
         """See `Scenario.kept_hulls`."""
         return self._motionless.kept_hulls
+
+    @property
+    def dod_landed(self) -> tuple[float, ...]:
+        """See `Scenario.dod_landed`: what planners plan to."""
+        return self._motionless.dod_landed
 
     @property
     def landing_zone_m(self) -> float:

@@ -65,7 +65,7 @@ class Range:
             x: (14,) its state.
 
         Returns:
-            Depth of discharge [-]; negative where coming home within `dod_max` is not sure.
+            Depth of discharge [-]; negative where coming home with the reserve is not sure.
         """
         home = self.home(uas, x)
-        return self._brief.uas[uas].dod_max - float(x[DOD]) - home.dod - home.dod_margin
+        return self._brief.dod_landed[uas] - float(x[DOD]) - home.dod - home.dod_margin

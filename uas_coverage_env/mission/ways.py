@@ -89,7 +89,7 @@ class Ways:
         self._tight = {tuple(node) for node in self._arena.nodes_m[near > 1].tolist()}
         self._waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self._led: set[tuple[int, int]] = set()
-        self._homes_m = np.array([uas.start_m for uas in brief.uas], float)
+        self._homes_m = np.array([uas.home_m for uas in brief.uas], float)
         for obstacle in self._arena.obstacles[:1]:
             # compiled now, not in the decision that first looks over a roof
             self._over(obstacle["lower_m"].copy(), obstacle["upper_m"].copy())

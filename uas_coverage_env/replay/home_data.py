@@ -37,7 +37,7 @@ def way_home(flight: Flight, history: SceneHistory) -> WayHome:
     began = [since for since, _ in history.changes]
     ranges = [Range(MissionBrief.of(scenario)) for _, scenario in history.changes]
     present = np.searchsorted(began, np.arange(len(flight.x)), side="right") - 1
-    lowest_soc = np.array([1.0 - uas.dod_max for uas in flight.scenario.uas])
+    lowest_soc = np.array([1.0 - dod for dod in flight.scenario.dod_landed])
     needed = np.tile(lowest_soc, (len(flight.x), 1))
     least: list[tuple[int, float]] = []
     no_return: list[int | None] = []

@@ -52,15 +52,15 @@ def reach(scenario: Scenario) -> Reach:
     needed = np.empty((len(scenario.uas), GRID, GRID))
     per_m, fixed = [], []
     x = np.zeros(N_STATES)
-    for i, uas in enumerate(scenario.uas):
-        x[DOD] = uas.dod_max
+    for i, dod_landed in enumerate(scenario.dod_landed):
+        x[DOD] = dod_landed
         for row, north in enumerate(north_m):
             for column, east in enumerate(east_m):
                 x[:3] = (north, east, -height_m)
                 home = range_.home(i, x)
-                needed[i, row, column] = 1.0 - uas.dod_max + home.dod + home.dod_margin
+                needed[i, row, column] = 1.0 - dod_landed + home.dod + home.dod_margin
         vehicle = brief.vehicles[i]
-        per_s = (1.0 + _MARGIN_SHARE) * dod_per_s(vehicle, uas.dod_max)
+        per_s = (1.0 + _MARGIN_SHARE) * dod_per_s(vehicle, dod_landed)
         # the last part of it is flown at less than full speed
         per_m.append(per_s * level_seconds(CALIBRATED, speeds_of(vehicle), 1.0))
         fixed.append(per_s * CALIBRATED.level_s)

@@ -100,9 +100,12 @@ def _above(flight: Flight, history: SceneHistory) -> list[FloatArray]:
     """(T, U) [m] room above the least height, beyond take-off and landing; none without one."""
     if history.scenario.min_height_m <= 0.0:
         return []
-    away_m = np.linalg.norm(flight.x[..., :2] - history.home_m[..., :2], axis=-1)
-    at_home = away_m <= history.scenario.landing_zone_m
-    return [np.where(at_home, np.inf, _height_room(flight, history))]
+    starts_m = np.array([uas.start_m for uas in history.scenario.uas])
+    low = np.zeros(flight.mode.shape, np.bool_)  # it may be
+    for ends_m in (starts_m, history.home_m):
+        away_m = np.linalg.norm(flight.x[..., :2] - ends_m[..., :2], axis=-1)
+        low |= away_m <= history.scenario.landing_zone_m
+    return [np.where(low, np.inf, _height_room(flight, history))]
 
 
 def floors_m(flight: Flight, history: SceneHistory) -> FloatArray:

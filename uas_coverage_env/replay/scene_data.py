@@ -50,7 +50,7 @@ def scene_data(history: SceneHistory) -> dict[str, Any]:
                 "name": uas.name,
                 "colour": colours.hex_of(colours.of_uas(i)),
                 "homes": _homes(history, i),
-                "lowest_soc": round(1.0 - uas.dod_max, 4),
+                "lowest_soc": round(1.0 - scenario.dod_landed[i], 4),
             }
             for i, uas in enumerate(scenario.uas)
         ],
@@ -95,7 +95,7 @@ def _waypoints(history: SceneHistory) -> list[dict[str, Any]]:
 
 def _homes(history: SceneHistory, i: int) -> list[dict[str, Any]]:
     """Where a UAS is to land, and from which sample on."""
-    homes_m = [(since, scenario.uas[i].start_m) for since, scenario in history.changes]
+    homes_m = [(since, scenario.uas[i].home_m) for since, scenario in history.changes]
     moved = [k for k in range(len(homes_m)) if k == 0 or homes_m[k][1] != homes_m[k - 1][1]]
     return [{"from": homes_m[k][0], "at": _metres(np.array(homes_m[k][1]))} for k in moved]
 

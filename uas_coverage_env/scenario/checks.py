@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.suggestions import did_you_mean
 from uas_coverage_env.scenario.feasibility import back_and_forth
-from uas_coverage_env.scenario.fields import Geofence, NoFlyZone, Obstacle
+from uas_coverage_env.scenario.fields import Geofence, NoFlyZone, Obstacle, Position_m, Uas
+from uas_coverage_env.scenario.planar import off_height
 from uas_coverage_env.scenario.unchecked import UncheckedScenario
 from uas_coverage_env.vehicle import load_vehicle, vehicle_names
 
@@ -26,19 +27,21 @@ def problems(scenario: UncheckedScenario) -> list[str]:
 
     Each line names the field, the value and the fix.
     """
-    found = [*_names_used_twice(scenario), *_vehicles(scenario)]
+    wrong_vehicles = list(_vehicles(scenario))
+    found = [*_names_used_twice(scenario), *wrong_vehicles]
     without_volume = list(_bodies_without_volume(scenario))
     if without_volume:
         # without hulls nothing can be said about places
         return [*found, *without_volume]
     return [
         *found,
+        *_planar(scenario),
         *_fence(scenario),
         *_waypoints(scenario),
-        *_starts_and_fixed_things(scenario),
+        *_places_and_fixed_things(scenario),
         *_starts_and_moving_obstacles(scenario),
         *_starts_and_each_other(scenario),
-        *_batteries(scenario),
+        *(_batteries(scenario) if not (wrong_vehicles and scenario.reserve) else ()),
         *_events(scenario),
         *_relaunch(scenario),
         *_asked_again(scenario),
@@ -95,6 +98,20 @@ def _fence(scenario: UncheckedScenario) -> Iterator[str]:
         )
 
 
+def _planar(scenario: UncheckedScenario) -> Iterator[str]:
+    planar = scenario.planar
+    if planar is None:
+        return
+    if planar.height_m < scenario.min_height_m:
+        yield (
+            f"planar.height_m: {planar.height_m:g} is below min_height_m "
+            f"{scenario.min_height_m:g}; raise it or leave min_height_m out"
+        )
+    yield from off_height(planar, "uas", "start_m", [uas.start_m for uas in scenario.uas])
+    places_m = [waypoint.position_m for waypoint in scenario.waypoints]
+    yield from off_height(planar, "waypoints", "position_m", places_m)
+
+
 def _waypoints(scenario: UncheckedScenario) -> Iterator[str]:
     positions = np.array([waypoint.position_m for waypoint in scenario.waypoints])
     outside_m = scenario.fence.signed_distance(positions)
@@ -114,28 +131,39 @@ def _waypoints(scenario: UncheckedScenario) -> Iterator[str]:
             )
 
 
-def _starts_and_fixed_things(scenario: UncheckedScenario) -> Iterator[str]:
-    margin_m = scenario.geofence.margin_m
+def _places_and_fixed_things(scenario: UncheckedScenario) -> Iterator[str]:
+    """Of starts, and of landing places that are not starts."""
     for index, uas in enumerate(scenario.uas):
-        start = f"uas[{index}].start_m: {_point(uas.start_m)}"
-        outside_m = float(scenario.fence.signed_distance(uas.start_m))
-        if outside_m > 0.0:
-            yield f"{start} lies {outside_m:.3g} m outside the geofence; move it inside"
-        elif outside_m > -margin_m:
+        yield from _place_and_fixed_things(scenario, uas, f"uas[{index}].start_m", uas.start_m)
+        if uas.land_m is not None:
+            yield from _place_and_fixed_things(scenario, uas, f"uas[{index}].land_m", uas.land_m)
+
+
+def _place_and_fixed_things(
+    scenario: UncheckedScenario, uas: Uas, field: str, place_m: Position_m
+) -> Iterator[str]:
+    margin_m, does = scenario.geofence.margin_m, "start" if field.endswith("start_m") else "land"
+    place = f"{field}: {_point(place_m)}"
+    outside_m = float(scenario.fence.signed_distance(place_m))
+    if outside_m > 0.0:
+        yield f"{place} lies {outside_m:.3g} m outside the geofence; move it inside"
+    elif outside_m > -margin_m:
+        yield (
+            f"{place} is {abs(outside_m):.3g} m from the geofence, within its margin_m "
+            f"{margin_m:g}, where no planner can {does}; move it further in"
+        )
+    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+        distance_m = float(hull.signed_distance(place_m))
+        named = f"obstacle {obstacle.name!r}"
+        yield from _too_close(
+            place, distance_m, named, uas.radius_m, obstacle.safe_distance_m, does
+        )
+        over_roof = hull.distance_when_raised(place_m, scenario.min_height_m) < 0.0
+        if over_roof and distance_m >= uas.radius_m + obstacle.safe_distance_m:
             yield (
-                f"{start} is {abs(outside_m):.3g} m from the geofence, within its margin_m "
-                f"{margin_m:g}, where no planner can start; move it further in"
+                f"{place} is lower than min_height_m {scenario.min_height_m:g} above the roof "
+                f"of {named}, where no planner can {does}; move it higher or away"
             )
-        for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-            distance_m = float(hull.signed_distance(uas.start_m))
-            named = f"obstacle {obstacle.name!r}"
-            yield from _too_close(start, distance_m, named, uas.radius_m, obstacle.safe_distance_m)
-            over_roof = hull.distance_when_raised(uas.start_m, scenario.min_height_m) < 0.0
-            if over_roof and distance_m >= uas.radius_m + obstacle.safe_distance_m:
-                yield (
-                    f"{start} is lower than min_height_m {scenario.min_height_m:g} above the roof "
-                    f"of {named}, where no planner can start; move it higher or away"
-                )
 
 
 def _starts_and_moving_obstacles(scenario: UncheckedScenario) -> Iterator[str]:
@@ -149,17 +177,23 @@ def _starts_and_moving_obstacles(scenario: UncheckedScenario) -> Iterator[str]:
 
 
 def _too_close(
-    start: str, distance_m: float, named: str, radius_m: float, safe_distance_m: float
+    place: str,
+    distance_m: float,
+    named: str,
+    radius_m: float,
+    safe_distance_m: float,
+    does: str = "start",
 ) -> Iterator[str]:
     if distance_m < radius_m:
+        at_once = " at once" if does == "start" else ""
         yield (
-            f"{start} is {distance_m:.3g} m from {named}, closer than radius_m {radius_m:g}: "
-            f"the UAS would be lost at once; move it away"
+            f"{place} is {distance_m:.3g} m from {named}, closer than radius_m {radius_m:g}: "
+            f"the UAS would be lost{at_once}; move it away"
         )
     elif distance_m < radius_m + safe_distance_m:
         yield (
-            f"{start} is {distance_m:.3g} m from {named}, closer than radius_m + safe_distance_m "
-            f"= {radius_m + safe_distance_m:g}, where no planner can start; move it away"
+            f"{place} is {distance_m:.3g} m from {named}, closer than radius_m + safe_distance_m "
+            f"= {radius_m + safe_distance_m:g}, where no planner can {does}; move it away"
         )
 
 
@@ -177,11 +211,17 @@ def _starts_and_each_other(scenario: UncheckedScenario) -> Iterator[str]:
 
 
 def _batteries(scenario: UncheckedScenario) -> Iterator[str]:
-    for index, uas in enumerate(scenario.uas):
-        if 1.0 - uas.soc_0 >= uas.dod_max:
+    for index, (uas, landed) in enumerate(zip(scenario.uas, scenario.dod_landed, strict=True)):
+        dod = 1.0 - uas.soc_0
+        if dod >= uas.dod_max:
             yield (
                 f"uas[{index}].soc_0: {uas.soc_0:g} is a depth of discharge of "
-                f"{1.0 - uas.soc_0:.3g}, not below dod_max {uas.dod_max:g}; charge it"
+                f"{dod:.3g}, not below dod_max {uas.dod_max:g}; charge it"
+            )
+        elif dod >= landed:
+            yield (
+                f"uas[{index}].soc_0: {uas.soc_0:g} is no more than the [reserve] leaves on "
+                f"landing; charge it or make the reserve smaller"
             )
 
 
@@ -235,8 +275,9 @@ def _events(scenario: UncheckedScenario) -> Iterator[str]:
 def _scene(scenario: UncheckedScenario) -> list[str]:
     found = [*_names_used_twice(scenario), *_bodies_without_volume(scenario)]
     return found or [
+        *_planar(scenario),
         *_waypoints(scenario),
-        *_starts_and_fixed_things(scenario),
+        *_places_and_fixed_things(scenario),
         *_starts_and_each_other(scenario),
     ]
 
@@ -279,6 +320,8 @@ def _free_part(
     """Points (P, 3) of a waypoint's sphere, and whether each keeps all safe distances (P,)."""
     radius_m, waypoint = min(uas.radius_m for uas in scenario.uas), scenario.waypoints[index]
     points = np.array(waypoint.position_m) + waypoint.radius_m * _BALL
+    if scenario.planar is not None:
+        points[:, 2] = waypoint.position_m[2]
     if waypoint.heights_m is not None:
         lowest_m, highest_m = waypoint.heights_m
         points = points[(lowest_m <= -points[:, 2]) & (-points[:, 2] <= highest_m)]
@@ -317,8 +360,9 @@ def _is_high_enough(
     for hull in scenario.hulls:
         high &= hull.distance_when_raised(points_m, scenario.min_height_m) >= 0.0
     for uas in scenario.uas:
-        away_m = np.hypot(*(points_m[:, :2] - uas.start_m[:2]).T)
-        high |= away_m <= scenario.landing_zone_m
+        for place_m in (uas.start_m, uas.home_m):
+            away_m = np.hypot(*(points_m[:, :2] - place_m[:2]).T)
+            high |= away_m <= scenario.landing_zone_m
     return high
 
 

@@ -94,17 +94,23 @@ def _shared_among_all(scenario: UncheckedScenario, spare: float) -> RoughPlan:
     """The plan of UAS that can cover all waypoints."""
     waypoints = np.array([waypoint.position_m for waypoint in scenario.waypoints])
     starts = np.array([uas.start_m for uas in scenario.uas])
+    homes = np.array([uas.home_m for uas in scenario.uas])
     air_time_s = np.array(
         [
-            seconds_until(vehicle, 1.0 - uas.soc_0, uas.dod_max, _POWER * vehicle.power.hover_W)
-            for vehicle, uas in zip(scenario.vehicles, scenario.uas, strict=True)
+            seconds_until(vehicle, 1.0 - uas.soc_0, dod, _POWER * vehicle.power.hover_W)
+            for vehicle, uas, dod in zip(
+                scenario.vehicles, scenario.uas, scenario.dod_landed, strict=True
+            )
         ]
     )
     legs = _Legs(scenario)
     limits_s = air_time_s * (1.0 - spare)
-    outward = legs.between(starts[:, None], waypoints[None])
-    runs = [_Runs(legs, waypoints[order], outward.through(order)) for order in _orders(waypoints)]
+    ends = _Ends.of(legs, starts, homes, waypoints)
+    runs = [_Runs(legs, waypoints[order], ends.through(order)) for order in _orders(waypoints)]
     plans = [flight_s for run in runs if (flight_s := run.balanced(limits_s)) is not None]
+    if (starts != homes).any():
+        along_s = _flown_along_ways(_Legs(scenario, around=True), starts, homes, waypoints)
+        plans += [along_s] if (along_s <= limits_s).all() else []
     complete = bool(plans)
     if not complete:
         endless = np.full(len(starts), math.inf)
@@ -112,10 +118,65 @@ def _shared_among_all(scenario: UncheckedScenario, spare: float) -> RoughPlan:
     return RoughPlan(min(plans, key=lambda flight_s: flight_s.max()), air_time_s, complete)
 
 
-class _Legs:
-    """Flight times between points: straight where that is free, else over the obstacles."""
+def along_ways(
+    starts_m: NDArray[np.float64],
+    homes_m: NDArray[np.float64],
+    waypoints_m: NDArray[np.float64],
+    can_cover: NDArray[np.bool_],
+) -> list[list[int]]:
+    """Each waypoint on the way, from start to home, that it lengthens the least, in that order.
 
-    def __init__(self, scenario: UncheckedScenario) -> None:
+    Args:
+        starts_m: (U, 3) [m].
+        homes_m: (U, 3) [m].
+        waypoints_m: (W, 3) [m].
+        can_cover: (U, W) which UAS may cover which waypoint.
+
+    Returns:
+        Waypoints of each UAS; of none those that no UAS may cover.
+    """
+    there_m, back_m = (
+        np.linalg.norm(ends_m[:, None] - waypoints_m, axis=2) for ends_m in (starts_m, homes_m)
+    )
+    ways_m = homes_m - starts_m
+    longer_m = there_m + back_m - np.linalg.norm(ways_m, axis=1)[:, None]
+    taker = np.where(can_cover, longer_m, np.inf).argmin(axis=0)
+    runs = []
+    for uas, way_m in enumerate(ways_m):
+        mine = np.flatnonzero((taker == uas) & can_cover[uas])
+        runs.append(mine[np.argsort(waypoints_m[mine] @ way_m, kind="stable")].tolist())
+    return runs
+
+
+def _flown_along_ways(
+    legs: _Legs,
+    starts: NDArray[np.float64],
+    homes: NDArray[np.float64],
+    waypoints: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(U,) flight times of `along_ways` of UAS that can cover all; places (N, 3) [m]."""
+    ends = _Ends.of(legs, starts, homes, waypoints)
+    flight_s = np.where(ends.idle_s > 0.0, ends.idle_s + 2.0 * GENERATED.landing_s, 0.0)
+    everyone = np.ones(ends.out_s.shape, np.bool_)
+    for uas, run in enumerate(along_ways(starts, homes, waypoints, everyone)):
+        if run:
+            between_s = legs.between(waypoints[run[:-1]], waypoints[run[1:]]).there_s
+            flight_s[uas] = ends.out_s[uas, run[0]] + between_s.sum() + ends.home_s[uas, run[-1]]
+            flight_s[uas] += 2.0 * GENERATED.landing_s
+    return flight_s
+
+
+class _Legs:
+    """Flight times between points: straight where that is free, else over the obstacles.
+
+    Args:
+        scenario: The mission.
+        around: Whether ways lead round what reaches up to the ceiling; otherwise over it, too.
+    """
+
+    def __init__(self, scenario: UncheckedScenario, *, around: bool = False) -> None:
+        ceiling_m = scenario.fence.vertices_m[:, 2].min() + scenario.geofence.margin_m
+        self.over_m = ceiling_m if around else -math.inf
         slowest = np.min([speeds_of(vehicle) for vehicle in scenario.vehicles], axis=0)
         self.speeds = SpeedLimits(*slowest.tolist())
         radius_m = max(uas.radius_m for uas in scenario.uas)
@@ -130,11 +191,15 @@ class _Legs:
         """Flight times from start_m (..., 3) to end_m (..., 3), broadcast together, and back."""
         way = end_m - start_m
         start_m = end_m - way
+        way_m = np.hypot(way[..., 0], way[..., 1])
         top_m = np.full(way.shape[:-1], -np.inf)
         for low, high in self.boxes:
             hit = _meets_box(start_m, way, low, high)
+            if low[2] < self.over_m:
+                way_m = np.where(hit, way_m + _round_m(start_m, end_m, low, high), way_m)
+                continue
             top_m = np.where(hit, np.maximum(top_m, -low[2]), top_m)
-        ground_s = level_seconds(GENERATED, self.speeds, np.hypot(way[..., 0], way[..., 1]))
+        ground_s = level_seconds(GENERATED, self.speeds, way_m)
         before_m, after_m = top_m + start_m[..., 2], top_m + end_m[..., 2]
         return _Times(
             there_s=np.maximum(
@@ -158,9 +223,28 @@ class _Times:
     there_s: NDArray[np.float64]
     back_s: NDArray[np.float64]
 
-    def through(self, order: NDArray[np.intp]) -> _Times:
-        """The same legs with their last axis in another order."""
-        return _Times(self.there_s[..., order], self.back_s[..., order])
+
+@dataclass(frozen=True)
+class _Ends:
+    """Flight times (U, W) from starts to waypoints and from there home, and (U,) without any."""
+
+    out_s: NDArray[np.float64]
+    home_s: NDArray[np.float64]
+    idle_s: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, legs: _Legs, starts: NDArray, homes: NDArray, waypoints: NDArray) -> _Ends:
+        """Those between places (U, 3), (U, 3) and (W, 3) [m]."""
+        stays = (starts == homes).all(axis=1)
+        return cls(
+            out_s=legs.between(starts[:, None], waypoints[None]).there_s,
+            home_s=legs.between(homes[:, None], waypoints[None]).back_s,
+            idle_s=np.where(stays, 0.0, legs.between(starts, homes).there_s),
+        )
+
+    def through(self, order: NDArray[np.intp]) -> _Ends:
+        """The same with the waypoints in another order."""
+        return _Ends(self.out_s[:, order], self.home_s[:, order], self.idle_s)
 
 
 def _meets_box(start_m: NDArray, way: NDArray, low: NDArray, high: NDArray) -> NDArray:
@@ -175,6 +259,22 @@ def _meets_box(start_m: NDArray, way: NDArray, low: NDArray, high: NDArray) -> N
         enters = np.maximum(enters, np.minimum(one, other))
         leaves = np.minimum(leaves, np.maximum(one, other))
     return np.less(enters, leaves)
+
+
+def _round_m(start_m: NDArray, end_m: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """(...) By how much the shortest way along one side of an upright box is longer, level [m]."""
+    corners = [np.array([n, e]) for n, e in ((low[0], low[1]), (low[0], high[1]),
+                                             (high[0], high[1]), (high[0], low[1]))]  # fmt: skip
+    start, end = start_m[..., :2], end_m[..., :2]
+    before, after = (
+        np.stack([np.linalg.norm(corner - place, axis=-1) for corner in corners])
+        for place in (start, end)
+    )
+    sides = [(a, b) for k in range(4) for a, b in ((k, (k + 1) % 4), ((k + 1) % 4, k))]
+    round_m = np.min(
+        [before[a] + np.linalg.norm(corners[b] - corners[a]) + after[b] for a, b in sides], axis=0
+    )
+    return round_m - np.linalg.norm(end - start, axis=-1)
 
 
 def _orders(waypoints: NDArray[np.float64]) -> list[NDArray[np.intp]]:
@@ -193,11 +293,13 @@ def _orders(waypoints: NDArray[np.float64]) -> list[NDArray[np.intp]]:
 class _Runs:
     """An order of waypoints that is cut into one run per UAS."""
 
-    def __init__(self, legs: _Legs, route: NDArray[np.float64], outward: _Times) -> None:
+    def __init__(self, legs: _Legs, route: NDArray[np.float64], ends: _Ends) -> None:
         between_s = legs.between(route[:-1], route[1:]).there_s
         self.at_s = np.concatenate([[0.0], np.cumsum(between_s)])
-        self.out_s = outward.there_s + GENERATED.landing_s
-        self.home_s = outward.back_s + GENERATED.landing_s
+        self.out_s = ends.out_s + GENERATED.landing_s
+        self.home_s = ends.home_s + GENERATED.landing_s
+        # a UAS that lands elsewhere flies, whether it has a run or not
+        self.idle_s = np.where(ends.idle_s > 0.0, ends.idle_s + 2.0 * GENERATED.landing_s, 0.0)
 
     def balanced(self, limits_s: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """(U,) flight times with the smallest largest one; None where the limits allow none."""
@@ -216,7 +318,7 @@ class _Runs:
 
     def _greedy(self, limits_s: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Give each UAS the longest run that its limit allows."""
-        flight_s = np.zeros(len(limits_s))
+        flight_s = self.idle_s.copy()
         first = 0
         for uas, limit_s in enumerate(limits_s):
             if first == len(self.at_s):
@@ -228,4 +330,5 @@ class _Runs:
             if length:
                 flight_s[uas] = run_s[length - 1]
                 first += length
-        return flight_s if first == len(self.at_s) else None
+        complete = first == len(self.at_s) and (self.idle_s <= limits_s).all()
+        return flight_s if complete else None

@@ -41,6 +41,7 @@ Distance_m = Annotated[float, Field(ge=0.0, le=10_000.0)]
 Length_m = Annotated[float, Field(gt=0.0, le=10_000.0)]
 Speed_mps = Annotated[float, Field(ge=-1_000.0, le=1_000.0)]
 Position_m = Annotated[tuple[Coordinate_m, Coordinate_m, Coordinate_m], BeforeValidator(_as_tuple)]
+Level_m = Annotated[tuple[Coordinate_m, Coordinate_m], BeforeValidator(_as_tuple)]
 Velocity_mps = Annotated[tuple[Speed_mps, Speed_mps, Speed_mps], BeforeValidator(_as_tuple)]
 Points_m = Annotated[
     tuple[tuple[Coordinate_m, Coordinate_m, Coordinate_m], ...],
@@ -248,9 +249,10 @@ class Uas(StrictModel):
 
     Attributes:
         name: Unique; the agent's name in the environments.
-        vehicle: A shipped vehicle (`s500_v2`, `hexacopter`) or the path of a vehicle file,
-            relative to the scenario file; held as an absolute path.
-        start_m: Where it takes off and lands [m].
+        vehicle: A shipped vehicle, such as `s500_v2`, or the path of a vehicle file, relative to
+            the scenario file; held as an absolute path.
+        start_m: Where it takes off [m].
+        land_m: Where it lands; without it, at its start [m].
         soc_0: State of charge at t = 0 [-].
         radius_m: Radius of the sphere that holds the machine, δ_UAV [m].
         dod_max: Depth of discharge beyond which the UAS is lost [-].
@@ -261,6 +263,7 @@ class Uas(StrictModel):
     name: Name
     vehicle: Annotated[str, Field(min_length=1, max_length=4096)]
     start_m: Position_m
+    land_m: Position_m | None = None
     soc_0: Annotated[float, Field(gt=0.0, le=1.0)]
     radius_m: Annotated[float, Field(gt=0.0, le=100.0)]
     dod_max: Annotated[float, Field(gt=0.0, lt=1.0)]
@@ -280,10 +283,15 @@ class Uas(StrictModel):
     def _without_what_is_usual(self, serialise: SerializerFunctionWrapHandler) -> Any:
         # files, and what is computed from them, are those of scenarios before the fields
         data = serialise(self)
-        for name, usual in (("sensors", ()), ("heading", "north")):
+        for name, usual in (("land_m", None), ("sensors", ()), ("heading", "north")):
             if getattr(self, name) == usual:
                 data.pop(name, None)
         return data
+
+    @property
+    def home_m(self) -> tuple[float, float, float]:
+        """Its home: where it lands [m]."""
+        return self.start_m if self.land_m is None else self.land_m
 
     @field_validator("vehicle")
     @classmethod

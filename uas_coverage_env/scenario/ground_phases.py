@@ -27,10 +27,12 @@ def height_above_ground_m(scenario: UncheckedScenario, position_m: Sequence[floa
     return height_m
 
 
-def take_off(scenario: UncheckedScenario, i: int) -> VerticalFlight:
-    """From the ground to the start of UAS i."""
+def take_off(
+    scenario: UncheckedScenario, i: int, position_m: Sequence[float] | None = None
+) -> VerticalFlight:
+    """From the ground to the start of UAS i, or to another place."""
     uas, vehicle = scenario.uas[i], scenario.vehicles[i]
-    height_m = height_above_ground_m(scenario, uas.start_m)
+    height_m = height_above_ground_m(scenario, uas.start_m if position_m is None else position_m)
     climb_mps = -vehicle.limits.v_up_max_mps
     rested = BatteryState.rested(vehicle.battery, 1.0 - uas.soc_0)
     return vertical_flight(vehicle, height_m, climb_mps, rested)

@@ -22,7 +22,7 @@ class Scenario(UncheckedScenario):
         name: Name of the scenario.
         dt_s: Length of a time step [s].
         max_steps: Steps after which a flight ends.
-        landing_distance_m: A UAS this close to its start can land [m].
+        landing_distance_m: A UAS this close to its home can land [m].
         landing_speed_mps: ... when it is slower than this [m/s].
         uas_safe_distance_m: Kept between two UAS in addition to their radii [m].
         min_height_m: Least height of a UAS above the ground (z = 0) and above roofs, except for
@@ -34,8 +34,12 @@ class Scenario(UncheckedScenario):
             it after the last sample; without it missions begin and end in the air.
         relaunch: Whether landed UAS take off again on their remaining charge, when no other UAS is
             working; without it, a UAS that has landed stays on the ground.
+        doors_m: Middles of openings at which routes may turn, north and east, (D, 2) [m].
+        planar: For missions in a plane: the height at which all UAS fly, start and land.
         geofence: The volume to stay in.
         obstacles: Fixed obstacles.
+        walls: Walls with doors; in the scenario that is read they are `obstacles`, and their doors
+            `doors_m`.
         moving_obstacles: Moving obstacles.
         uas: The fleet.
         waypoints: Points to be covered.
@@ -48,6 +52,7 @@ class Scenario(UncheckedScenario):
         sensing: Errors with which planners and autopilots know the UAS; without it, none.
         events: What happens during the mission: a table `[[events]]` for each.
         sorties: Battery packs of each UAS; without it, one.
+        reserve: Charge with which UAS land at the latest; without it, what `dod_max` leaves.
         execution: For missions that an autopilot will fly from files.
     """
 

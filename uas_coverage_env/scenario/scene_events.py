@@ -219,9 +219,9 @@ class HomeClosed(OfUas):
     alternative_m: Position_m
 
     def revised(self, scenario: Any, time_s: float, uas: int) -> dict[str, Any]:
-        """Its start is the other place."""
+        """It lands at the other place."""
         fleet = list(scenario.uas)
-        fleet[uas] = _with(fleet[uas], start_m=self.alternative_m)
+        fleet[uas] = _with(fleet[uas], land_m=self.alternative_m)
         return {"uas": tuple(fleet)}
 
 

@@ -26,10 +26,14 @@ from uas_coverage_env.scenario.fields import (
 )
 from uas_coverage_env.scenario.model import Scenario
 from uas_coverage_env.scenario.packs import Sorties
+from uas_coverage_env.scenario.planar import PLACES, Planar
+from uas_coverage_env.scenario.reserve import LandingReserve
+from uas_coverage_env.scenario.walls import Door, Wall
 
 _TABLES = (
     *(Geofence, Uas, Sensor, Waypoint, Obstacle, MovingObstacle, ScheduledVelocity, Decoration),
-    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing, Sorties, Execution),
+    *(Place, Wind, Gust, RandomGusts, Uncertainty, Sensing, Sorties, LandingReserve, Execution),
+    *(Planar, Wall, Door),
     *EVENT_KINDS,
 )
 _ENTRY = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
@@ -45,6 +49,16 @@ def scenario_schema() -> dict[str, Any]:
     _describe(schema, Scenario)
     for model in _TABLES:
         _describe(schema["$defs"][model.__name__], model)
+    for name in ("Uas", "Waypoint", *(kind.__name__ for kind in EVENT_KINDS)):
+        for key, entry in schema["$defs"][name]["properties"].items():
+            if any(key in keys for keys in PLACES.values()) and "prefixItems" in entry:
+                entry["minItems"] = 2
+    # with their heights, unless the mission has one
+    whole = {
+        table: {"items": {"properties": {key: {"minItems": 3} for key in keys}}}
+        for table, keys in PLACES.items()
+    }
+    schema |= {"if": {"required": ["planar"]}, "else": {"properties": whole}}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

@@ -83,7 +83,7 @@ class MissionSource:
         spare = SPARE * most.n_waypoints, max(MOVING, SPARE * most.n_moving)
         found = Room(most.n_uas, *spare)
         self.room = found._replace(**{k: count for k, count in said.items() if count is not None})
-        first = examples[0]
+        self._first = first = examples[0]
         self.names = tuple(
             first.uas[i].name if self.fixed else f"uas_{i + 1}" for i in range(self.room.n_uas)
         )
@@ -149,6 +149,13 @@ class MissionSource:
             ValueError: It does not fit.
         """
         scenario = loaded_scenario(scenario)
+        if (scenario.planar is None) != (self._first.planar is None):
+            one = "planar" if scenario.planar else "not planar"
+            other = "not planar" if scenario.planar else "planar"
+            raise ValueError(
+                f"scenario {scenario.name!r} is {one} and {self._first.name!r} of the same "
+                f"environment is {other}; actions have fewer numbers in the plane: fly them apart"
+            )
         has = Room.of(scenario)
         for name, noun, count, most in zip(Room._fields, _NOUNS, has, self.room, strict=True):
             if count > most:

@@ -22,7 +22,8 @@ def toml_text(data: Mapping[str, Any]) -> str:
             document.add(key, _table(value))
         elif isinstance(value, list):
             if value:
-                document.add(key, _tables(value))
+                tables = isinstance(value[0], Mapping)
+                document.add(key, _tables(value) if tables else _array(value))
         elif value is not None:
             document.add(key, value)
     return tomlkit.dumps(document)

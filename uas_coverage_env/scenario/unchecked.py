@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, SerializerFunctionWrapHandler, Strict, create_model, model_serializer
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    Strict,
+    create_model,
+    model_serializer,
+    model_validator,
+)
 
 from uas_coverage_env.features.event import EventTable
 from uas_coverage_env.features.parameter_errors import Uncertainty
@@ -24,6 +31,7 @@ from uas_coverage_env.scenario.fields import (
     Distance_m,
     Geofence,
     Length_m,
+    Level_m,
     MovingObstacle,
     Name,
     Obstacle,
@@ -33,6 +41,9 @@ from uas_coverage_env.scenario.fields import (
 )
 from uas_coverage_env.scenario.packs import Sorties
 from uas_coverage_env.scenario.payload import who_covers
+from uas_coverage_env.scenario.planar import Planar, completed
+from uas_coverage_env.scenario.reserve import LandingReserve
+from uas_coverage_env.scenario.walls import Wall
 from uas_coverage_env.vehicle import VehicleParams, load_vehicle
 
 GLIDE = 2.0
@@ -68,8 +79,11 @@ class UncheckedScenario(_Tables):
     route_margin_m: Distance_m | None = None
     from_ground: bool = False
     relaunch: bool = False
+    doors_m: Annotated[tuple[Level_m, ...], Strict(False)] = ()
+    planar: Planar | None = None
     geofence: Geofence
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = ()
+    walls: Annotated[tuple[Wall, ...], Strict(False)] = ()
     moving_obstacles: Annotated[tuple[MovingObstacle, ...], Strict(False)] = ()
     uas: Annotated[tuple[Uas, ...], Strict(False), Field(min_length=1)]
     waypoints: Annotated[tuple[Waypoint, ...], Strict(False), Field(min_length=1)]
@@ -81,14 +95,34 @@ class UncheckedScenario(_Tables):
     sensing: Sensing | None = None
     events: Events = ()
     sorties: Sorties | None = None
+    reserve: LandingReserve | None = None
     execution: Execution | None = None
+
+    @model_validator(mode="after")
+    def _walls_are_obstacles(self) -> Self:
+        """Put boxes in the place of walls: what reads obstacles need not know of walls."""
+        named = [(f"wall_{k + 1}", wall) for k, wall in enumerate(self.walls)]
+        if named:
+            boxes = [box for name, wall in named for box in wall.obstacles(name)]
+            middles_m = [middle_m for wall in self.walls for middle_m in wall.door_middles_m()]
+            # the record is frozen for everything else
+            object.__setattr__(self, "obstacles", (*self.obstacles, *boxes))
+            object.__setattr__(self, "doors_m", (*self.doors_m, *middles_m))
+            object.__setattr__(self, "walls", ())
+        return self
+
+    @classmethod
+    def completed(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The data of a file with what it may leave out, see `planar.completed`."""
+        return completed(data)
 
     @model_serializer(mode="wrap")
     def _without_absent_tables(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # files, and what is computed from their content, are those of scenarios before the field
         data = serialise(self)
         for name, field in type(self).model_fields.items():
-            if name not in _ALWAYS and not field.is_required() and data.get(name) == field.default:
+            usual = not field.is_required() and getattr(self, name) == field.default
+            if usual and name not in _ALWAYS:
                 data.pop(name, None)
         return data
 
@@ -119,17 +153,21 @@ class UncheckedScenario(_Tables):
         """What commands keep the safe distance from: the hulls, raised where that is not enough.
 
         Beyond a face of a raised hull by radius and safe distance, the least height above the
-        roof is kept as well.
+        roof is kept as well. In a planar mission: what of them is at its height, see `Planar`.
         """
         radius_m = min(uas.radius_m for uas in self.uas)
-        return tuple(
-            hull.raised(self.min_height_m, radius_m + obstacle.safe_distance_m)
-            for obstacle, hull in zip(self.obstacles, self.hulls, strict=True)
+        kept_m = [radius_m + obstacle.safe_distance_m for obstacle in self.obstacles]
+        raised = (
+            hull.raised(self.min_height_m, distance_m)
+            for hull, distance_m in zip(self.hulls, kept_m, strict=True)
         )
+        if self.planar is None:
+            return tuple(raised)
+        return tuple(map(self.planar.kept, raised, kept_m))
 
     @property
     def landing_zone_m(self) -> float:
-        """Horizontal distance from its start within which a UAS may fly low [m]."""
+        """Horizontal distance from its start and home within which a UAS may fly low [m]."""
         return self.landing_distance_m + GLIDE * self.min_height_m
 
     def after(self, event: EventTable, time_s: float, uas: int = 0) -> Self:
@@ -176,6 +214,16 @@ class UncheckedScenario(_Tables):
     def can_cover(self) -> NDArray[np.bool_]:
         """(U, W) whether each UAS carries the sensor that each waypoint asks for."""
         return who_covers(self.uas, self.waypoints)
+
+    @cached_property
+    def dod_landed(self) -> tuple[float, ...]:
+        """Depth of discharge with which each UAS lands at the latest: `dod_max`, or less."""
+        if self.reserve is None:
+            return tuple(uas.dod_max for uas in self.uas)
+        return tuple(
+            self.reserve.dod(vehicle, uas.dod_max)
+            for uas, vehicle in zip(self.uas, self.vehicles, strict=True)
+        )
 
     @cached_property
     def vehicles(self) -> tuple[VehicleParams, ...]:

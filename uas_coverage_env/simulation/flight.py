@@ -119,6 +119,8 @@ def _check_and_clip(arena, i, event):
     if not math.isfinite(total):
         raise ValueError("what disturbances do to a UAS is not finite; correct their kernels")
     clip_wrench(arena.vehicles[i], event.u)
+    if arena.vehicles[i].holds_height:
+        event.wind_mps[2] = event.force_N[2] = 0.0
 
 
 @rare_kernel
@@ -196,6 +198,9 @@ def _move_all(arena, state, nonlinear, outcome):
         u = event.u[:]
         vehicle, flown = arena.vehicles[i], _flown_vehicle(arena, state, i)
         dod_before = x[DOD]
+        if vehicle.holds_height:
+            # the lift that carries the true weight
+            u[LIFT] = 0.0 - flown.lift_surplus_N / flown.thrust_factor
         if disturbed:
             enter_air(x, event.wind_mps)
         if nonlinear:

@@ -78,6 +78,7 @@ def begin_step_of(state, commands, outcome, i):
     event.contact_with = -1
     event.breaches = 0
     event.too_low = False
+    event.below_reserve = False
     event.limits_exceeded = 0
     event.landed = False
     event.obstacle_clearance_m = math.inf

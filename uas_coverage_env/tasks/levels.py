@@ -88,9 +88,17 @@ LEVELS: Mapping[str, Task] = {
             disturbances="moderate",
             faults=faults,
         ),
+        Task(
+            level="air-taxi",
+            meaning="two or three air taxis that fly one way, from vertiport to vertiport",
+            families=_families("air-taxi", n_uas=(2, 3), n_waypoints=(4, 8)),
+            return_mode=True,
+            safety_filter=True,
+        ),
     )
 }  # fmt: skip
-"""Name -> level, from easy to hard, in the first version of the environments."""
+"""Name -> level, from easy to hard and then of other sizes, in the first version of the
+environments."""
 
 
 @cache

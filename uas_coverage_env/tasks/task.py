@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from uas_coverage_env.env.versions import V0, Version
+from uas_coverage_env.registration import level_id
 from uas_coverage_env.scenario import Family, MissionSource, Scenario
 from uas_coverage_env.scenario.levels import with_disturbances
 
@@ -73,7 +74,7 @@ class Task:
     @property
     def id(self) -> str:
         """Under which Gymnasium knows it."""
-        return f"UASCoverage/{self.level.capitalize()}-{self.version.name}"
+        return level_id(self.level, self.version.name)
 
     def scenario(self, seed: int) -> Scenario:
         """The mission of a seed; the same each time."""

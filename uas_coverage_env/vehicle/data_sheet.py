@@ -25,7 +25,7 @@ class DataSheet(StrictModel):
         cells: LiPo cells in series.
         capacity_Ah: Of the whole battery.
         hover_minutes: From a full battery until `charge_left` is left.
-        top_speed_mps: Horizontal, in still air.
+        top_speed_mps: Horizontal, in still air: what drag lets it reach.
         charge_left: State of charge at the end of `hover_minutes`.
         arm_m: Centre to rotor axis.
         tilt_deg: Largest tilt in flight.
@@ -34,25 +34,36 @@ class DataSheet(StrictModel):
         resistance_mohm: Internal resistance of the battery.
         climb_mps: Largest rate of climb.
         descent_mps: Largest rate of descent.
+        speed_limit_mps: What it is flown at the most; None: its top speed.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=100)]
-    mass_kg: Annotated[float, _within(0.05, 200.0)]
+    mass_kg: Annotated[float, _within(0.01, 5000.0)]
     motors: Annotated[int, _within(3, 32)]
-    diameter_in: Annotated[float, _within(1.0, 60.0)]
-    pitch_in: Annotated[float, _within(0.3, 60.0)]
-    cells: Annotated[int, _within(1, 30)]
-    capacity_Ah: Annotated[float, _within(0.05, 500.0)]
+    diameter_in: Annotated[float, _within(0.5, 120.0)]
+    pitch_in: Annotated[float, _within(0.1, 144.0)]
+    cells: Annotated[int, _within(1, 300)]
+    capacity_Ah: Annotated[float, _within(0.01, 5000.0)]
     hover_minutes: Annotated[float, _within(1.0, 300.0)]
-    top_speed_mps: Annotated[float, _within(3.0, 40.0)]
+    top_speed_mps: Annotated[float, _within(0.5, 100.0)]
     charge_left: Annotated[float, _within(0.0, 0.5)] = 0.0
-    arm_m: Annotated[float, _within(0.02, 10.0)] | None = None
+    arm_m: Annotated[float, _within(0.01, 30.0)] | None = None
     tilt_deg: Annotated[float, _within(10.0, 45.0)] | None = None
     thrust_to_weight: Annotated[float, _within(1.3, 20.0)] | None = None
-    auxiliary_W: Annotated[float, _within(0.0, 1e4)] | None = None
-    resistance_mohm: Annotated[float, _within(0.01, 1e4)] | None = None
+    auxiliary_W: Annotated[float, _within(0.0, 1e5)] | None = None
+    resistance_mohm: Annotated[float, _within(0.01, 1e5)] | None = None
     climb_mps: Annotated[float, _within(0.1, 30.0)] | None = None
     descent_mps: Annotated[float, _within(0.1, 30.0)] | None = None
+    speed_limit_mps: Annotated[float, _within(0.5, 100.0)] | None = None
+
+    @model_validator(mode="after")
+    def _limit_below_top_speed(self) -> Self:
+        if self.speed_limit_mps is not None and self.speed_limit_mps > self.top_speed_mps:
+            raise ValueError(
+                f"speed_limit_mps {self.speed_limit_mps:g} is more than top_speed_mps "
+                f"{self.top_speed_mps:g}, which drag does not let it exceed; lower the limit"
+            )
+        return self
 
     @model_validator(mode="after")
     def _pitch_below_diameter(self) -> Self:

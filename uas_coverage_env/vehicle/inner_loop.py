@@ -192,7 +192,8 @@ def _speed_towards(distance, speed, per_speed, per_next_speed, brake):
     both = per_speed + per_next_speed
     left = (distance - per_speed * speed) / both
     n = 1.0
-    if left > 0.0:
+    # a UAS whose height is fixed has nothing to brake with
+    if left > 0.0 and brake > 0.0:
         n = max(math.ceil(0.5 * (math.sqrt(1.0 + 8.0 * left / brake) - 1.0)), 1.0)
     return left / n + 0.5 * brake * (n - 1.0)
 

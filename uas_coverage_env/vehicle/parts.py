@@ -25,7 +25,7 @@ def _within(low: float, high: float) -> Any:
 
 
 Force_N = Annotated[float, _within(1e-6, 1e6)]
-Inertia_kgm2 = Annotated[float, _within(1e-8, 1e5)]
+Inertia_kgm2 = Annotated[float, _within(1e-9, 1e7)]
 Length_m = Annotated[float, _within(1e-3, 100.0)]
 Speed_mps = Annotated[float, _within(0.01, 1000.0)]
 Rate = Annotated[float, _within(1e-3, 1000.0)]
@@ -114,7 +114,7 @@ class Rotor(RecordedPart):
 class Motor(RecordedPart):
     """One brushless motor, its speed controller's resistance included."""
 
-    back_emf_Vs_per_rad: Annotated[float, _within(1e-6, 10.0)]
+    back_emf_Vs_per_rad: Annotated[float, _within(1e-6, 100.0)]
     resistance_ohm: Resistance_ohm
     no_load_current_A: Annotated[float, _within(0.0, 1000.0)]
 
@@ -122,7 +122,7 @@ class Motor(RecordedPart):
 class Esc(RecordedPart):
     """One electronic speed controller."""
 
-    constant_loss_W: Annotated[float, _within(0.0, 1e5)]
+    constant_loss_W: Annotated[float, _within(0.0, 1e6)]
     efficiency: Annotated[float, Field(gt=0.0, le=1.0)]
 
 
@@ -130,7 +130,7 @@ class Power(StrictModel):
     """Battery power around hover; what the power train gives is computed where it is left out."""
 
     auxiliary_W: Annotated[float, _within(0.0, 1e5)]
-    hover_W: Annotated[float, _computed(1e-3, 1e6)] = ABSENT
+    hover_W: Annotated[float, _computed(1e-3, 1e7)] = ABSENT
     slope_W_per_N: Annotated[float, _computed(1e-3, 1e4)] = ABSENT
 
 
@@ -277,10 +277,10 @@ class ThrustCorrection(RecordedPart):
     Those that are left out are fitted to the exact form.
     """
 
-    speed_N_per_mps: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
-    climb_N_per_mps: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
-    descent_N_per_mps: Annotated[float, _computed(0.0, 1000.0)] = ABSENT
-    tilt_N_per_rad: Annotated[float, _computed(0.0, 1e5)] = ABSENT
+    speed_N_per_mps: Annotated[float, _computed(0.0, 1e5)] = ABSENT
+    climb_N_per_mps: Annotated[float, _computed(0.0, 1e5)] = ABSENT
+    descent_N_per_mps: Annotated[float, _computed(0.0, 1e5)] = ABSENT
+    tilt_N_per_rad: Annotated[float, _computed(0.0, 1e6)] = ABSENT
 
 
 class ReturnRule(StrictModel):

@@ -9,6 +9,9 @@ theta = atan(theta_lin(t)), and the velocities of the step come out as predicted
 A UAS that looks where it flies has its tilts on axes that do not turn (`layout`). It is flown as
 if it faced north: its heading goes beside, as the LPV model has it, and nothing depends on it.
 
+In a planar mission the vertical axis is a constraint: height and vertical speed are put back after
+every substep, and the thrust (m g + L) / (cos phi cos theta) carries the weight at the tilt flown.
+
 Left out: motor lag (30 ms against steps of a second), the gyroscopic torque of the rotors, the
 loss of motor speed with a falling battery voltage, what a turn to the course does to the tilts.
 """
@@ -31,6 +34,7 @@ _RATE_GAIN_PER_S = 20.0
 # what the flight controller refuses to ask for, whatever the wrench says
 _TILT_ASKED_RAD = 1.0
 _RATE_ASKED_RADPS = 3.0
+_YAW_SHARE = 0.5
 # stops of the simulation, far from any flight of ours: Euler angles end at 90 degrees
 _TILT_STOP_RAD = 1.3
 _RATE_STOP_RADPS = 50.0
@@ -43,8 +47,9 @@ _ROLL, _PITCH, _YAW, _ROLL_RATE, _PITCH_RATE, _YAW_RATE = range(6)
 def mix(vehicle, thrust_N, torque, motor_thrust_N):
     """Thrust and torque (3,) as N_M motor thrusts, each within what a motor can give.
 
-    Motor thrusts are the pseudo-inverse of the rotor map, clipped. Returns the total thrust;
-    `torque` becomes what the motors give.
+    Motor thrusts are the pseudo-inverse of the rotor map, clipped. Yaw takes no motor's thrust by
+    more than half of its share, as of autopilots that tilt first: large rotors give little yaw
+    torque. Returns the total thrust; `torque` becomes what the motors give.
     """
     n = vehicle.n_motors
     strongest = vehicle.thrust_N_per_radps2 * vehicle.motor_speed_max_radps**2
@@ -52,6 +57,11 @@ def mix(vehicle, thrust_N, torque, motor_thrust_N):
     roll = 0.0
     pitch = 0.0
     yaw = 0.0
+    most_yaw = _YAW_SHARE * thrust_N / n
+    for i in range(n):
+        per_yaw = abs(vehicle.mixer[i, OF_YAW])
+        if n > 3 and per_yaw * abs(torque[2]) > most_yaw:
+            torque[2] = math.copysign(most_yaw / per_yaw, torque[2])
     for i in range(n):
         mixer = vehicle.mixer[i]
         share = mixer[OF_THRUST] * thrust_N + mixer[OF_ROLL] * torque[0]
@@ -226,7 +236,7 @@ def plant_step(vehicle, x, u, x_next):
         further_V[p] = vehicle.further_V[p]
     for s in range(x.shape[0]):
         x_next[s] = x[s]
-    psi, yaw_rate, yaw_torque = x[S.PSI], x[S.WZ], u[S.TAU_Z]
+    down_m, psi, yaw_rate, yaw_torque = x[S.Z], x[S.PSI], x[S.WZ], u[S.TAU_Z]
     if rarely(vehicle.follows_course):
         x_next[S.PSI] = u[S.TAU_Z] = 0.0
         # the body's own rate, at which its tilts do not turn it
@@ -271,6 +281,8 @@ def plant_step(vehicle, x, u, x_next):
             torque[axis] *= vehicle.thrust_factor
         thrust *= vehicle.thrust_factor
         _integrate(vehicle, x_next, h, thrust, torque, slope, total, middle)
+        if rarely(vehicle.holds_height):
+            x_next[S.Z], x_next[S.VZ] = down_m, 0.0
     if rarely(vehicle.follows_course):
         u[S.TAU_Z] = yaw_torque
         x_next[S.PSI], x_next[S.WZ] = psi, yaw_rate

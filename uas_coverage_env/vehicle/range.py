@@ -2,7 +2,7 @@
 
 What estimates differ in is a `TravelTimeModel`. The calibrated one is `CALIBRATED`; others stand
 with what uses them, those of planners in `planning.reserves` (why they differ:
-docs/range_method.md).
+docs/range.md).
 """
 
 import math

@@ -76,6 +76,8 @@ VEHICLE_DTYPE = record_dtype(
         ("torque_max_Nm", _f8, (3,)),
         # a UAS that looks where it flies, see `layout`; the arena says which do
         ("follows_course", "?"),
+        # one whose height is fixed, in a planar mission; likewise
+        ("holds_height", "?"),
         # what a sample must not exceed, see `limits`
         ("bounds", _f8, (N_LIMITS,)),
         # velocity loop

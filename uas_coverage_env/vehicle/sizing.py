@@ -36,6 +36,7 @@ _AIR_KGPM3 = 1.225
 _FIGURE_OF_MERIT = 0.65
 _EFFICIENCIES = (0.3, 0.92)  # of motors and speed controllers in hover
 _S500 = "as the S500"
+_S500_ARM_M = 0.23
 
 # proportions of the S500, from its bench table and its identified battery
 _THRUST_COEFFICIENT_BY_PITCH = 0.185
@@ -50,6 +51,7 @@ _CELL_OCV_V = (4.2, 3.938, 3.653, 3.3)
 _CELL_RESISTANCE_OHM_AH = 0.056
 _RESISTANCE_0_SHARE = 0.661
 _TIME_CONSTANT_S = 1.76
+_RETURN_SHARE = 0.131
 
 
 class MadeVehicle(NamedTuple):
@@ -79,7 +81,11 @@ def make_vehicle(sheet: DataSheet) -> MadeVehicle:
         **_drive(sheet, battery, hover_W),
         "battery": _battery_section(sheet, battery, hover_W),
         "limits": _limits(sheet),
-        "return_rule": {"distance_over_speed_s": assumed(180.0, _S500)},
+        "return_rule": {
+            "distance_over_speed_s": assumed(
+                60.0 * _RETURN_SHARE * sheet.hover_minutes, f"13.1 % of hover_minutes, {_S500}"
+            )
+        },
     }
     data = tomllib.loads(file_text(sheet.name, sections))
     try:
@@ -142,11 +148,16 @@ def _hover_W(sheet: DataSheet, battery: Battery) -> float:
     return float(brentq(too_little_W, 0.0, most_W))  # pyrefly: ignore[bad-argument-type]
 
 
+def _arm_m(sheet: DataSheet) -> float:
+    radius_m = 0.5 * _INCH_M * sheet.diameter_in
+    return sheet.arm_m or _ARM_OF_RADIUS * radius_m / math.sin(math.pi / sheet.motors)
+
+
 def _airframe(sheet: DataSheet) -> dict[str, Value]:
     radius_m = 0.5 * _INCH_M * sheet.diameter_in
     half_gap = math.sin(math.pi / sheet.motors)
     arm = computed(
-        _ARM_OF_RADIUS * radius_m / half_gap,
+        _arm_m(sheet),
         "neighbouring propellers 0.28 diameters apart, as the S500's",
     )
     if sheet.arm_m is not None:
@@ -156,7 +167,7 @@ def _airframe(sheet: DataSheet) -> dict[str, Value]:
                 f"arm_m {sheet.arm_m:g} lets {sheet.motors} propellers of {sheet.diameter_in:g} in "
                 f"overlap; give {radius_m / half_gap:.3g} or more"
             )
-    arm_m = sheet.arm_m or _ARM_OF_RADIUS * radius_m / half_gap
+    arm_m = _arm_m(sheet)
     weight_N = sheet.mass_kg * _GRAVITY_MPS2
     return {
         "n_motors": given(sheet.motors, "motors"),
@@ -299,17 +310,25 @@ def _limits(sheet: DataSheet) -> dict[str, Value]:
         return assumed(default, "autopilot default") if value is None else given(value, option)
 
     tilt = assumed(tilt_rad, "25 degrees, as the S500")
+    limit = given(sheet.top_speed_mps, "top_speed_mps")
+    if sheet.speed_limit_mps is not None:
+        limit = given(sheet.speed_limit_mps, "speed_limit_mps")
+    speed_mps = sheet.speed_limit_mps or sheet.top_speed_mps
+    # half as long, twice the angular acceleration (Froude scaling); about x and y the S500's is so
+    # far below what motors can do that it serves larger vehicles, too
+    per_s2 = _S500_ARM_M / _arm_m(sheet)
+    tilting_per_s2, froude = max(per_s2, 1.0), "the S500's, by the arm (Froude scaling)"
     return {
-        "v_xy_max_mps": given(sheet.top_speed_mps, "top_speed_mps"),
-        "v_cruise_mps": assumed(_CRUISE_SHARE * sheet.top_speed_mps, "5/6 of it, as the S500"),
-        "v_up_max_mps": known("climb_mps", 3.0),
-        "v_down_max_mps": known("descent_mps", 1.5),
+        "v_xy_max_mps": limit,
+        "v_cruise_mps": assumed(_CRUISE_SHARE * speed_mps, "5/6 of it, as the S500"),
+        "v_up_max_mps": known("climb_mps", min(3.0, speed_mps)),
+        "v_down_max_mps": known("descent_mps", min(1.5, 0.5 * speed_mps)),
         "tilt_max_rad": tilt if sheet.tilt_deg is None else given(tilt_rad, "tilt_deg"),
         "yaw_max_rad": assumed(0.35, _S500),
-        "rate_max_radps": assumed(0.50, _S500),
-        "yaw_rate_max_radps": assumed(0.35, _S500),
-        "angular_acceleration_xy_max_radps2": assumed(0.50, _S500),
-        "angular_acceleration_z_max_radps2": assumed(0.35, _S500),
+        "rate_max_radps": assumed(0.50 * math.sqrt(tilting_per_s2), froude),
+        "yaw_rate_max_radps": assumed(0.35 * math.sqrt(per_s2), froude),
+        "angular_acceleration_xy_max_radps2": assumed(0.50 * tilting_per_s2, froude),
+        "angular_acceleration_z_max_radps2": assumed(0.35 * per_s2, froude),
         "delta_thrust_min_N": assumed(-0.50 * weight_N, "half the weight"),
         "delta_thrust_max_N": assumed(
             _delta_thrust_share(sheet) * weight_N,

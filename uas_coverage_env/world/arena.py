@@ -12,6 +12,7 @@ from uas_coverage_env.entities.commands import CLIMB, COMMAND_DTYPE
 from uas_coverage_env.features.feature import FEATURE_DTYPE, MissionFeature, feature_tables
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.governor import time_scale
 from uas_coverage_env.vehicle.range import dod_per_s
 from uas_coverage_env.vehicle.record import VEHICLE_DTYPE
 from uas_coverage_env.vehicle.scale import braking_s, clock_reserve_s, length_scale
@@ -47,14 +48,20 @@ SAMPLES_AFTER_END = 64
 
 UAS_DTYPE = record_dtype(
     [
+        ("start_m", "f8", (3,)),
+        # where it lands
         ("home_m", "f8", (3,)),
         ("radius_m", "f8"),
+        # with which it lands at the latest, the reserve kept; and beyond which it is lost
         ("dod_max", "f8"),
+        ("dod_empty", "f8"),
         # what guidance and return mode assume of the vehicle
         ("speed_mps", "f8"),
         ("climb_mps", "f8"),
         ("descent_mps", "f8"),
         ("dod_per_s", "f8"),
+        # of the times of guidance, see `governor.time_scale`
+        ("time_scale", "f8"),
         # bits, see `WAYPOINT_DTYPE`
         ("sensors", "i8"),
     ]
@@ -72,8 +79,8 @@ RULES_DTYPE = record_dtype(
         ("landing_speed_mps", "f8"),
         ("uas_safe_distance_m", "f8"),
         ("fence_margin_m", "f8"),
-        # above ground and roofs, 0 without such a rule; and how far from its start a UAS may be
-        # lower, horizontally
+        # above ground and roofs, 0 without such a rule; and how far from its start and home a UAS
+        # may be lower, horizontally
         ("min_height_m", "f8"),
         ("landing_zone_m", "f8"),
         # the largest safe distance of all obstacles
@@ -144,7 +151,7 @@ class Arena(NamedTuple):
     nodes_m: Annotated[NDArray[np.float64], "N", 2]
     """[m] corners at which routes turn."""
     node_distance_m: Annotated[NDArray[np.float64], "W + U", "N"]
-    """[m] way from a corner to a waypoint or a start; inf where there is none."""
+    """[m] way from a corner to a waypoint or a home; inf where there is none."""
     features: Annotated[NDArray[np.void], FEATURE_DTYPE, "features"]
     """As many in all missions of a pool."""
     feature_words: Annotated[NDArray[np.uint64], "feature words"]
@@ -249,6 +256,10 @@ def _vehicles(scenario: Scenario) -> NDArray[np.void]:
     for i, vehicle in enumerate(scenario.vehicles):
         records[i] = compiled[vehicle]
     records["follows_course"] = [uas.heading == "course" for uas in scenario.uas]
+    if scenario.planar is not None:
+        # no input acts on a height that is fixed
+        records["holds_height"] = True
+        records["lift_min_N"] = records["lift_max_N"] = 0.0
     return records
 
 
@@ -267,17 +278,22 @@ def _moving(scenario: Scenario) -> tuple[NDArray[np.float64], NDArray[np.float64
 
 def _uas(scenario: Scenario) -> NDArray[np.void]:
     rows = []
-    for entry, vehicle in zip(scenario.uas, scenario.vehicles, strict=True):
+    for entry, vehicle, dod_landed in zip(
+        scenario.uas, scenario.vehicles, scenario.dod_landed, strict=True
+    ):
         limits = vehicle.limits
         rows.append(
             (
                 entry.start_m,
+                entry.home_m,
                 entry.radius_m,
+                dod_landed,
                 entry.dod_max,
                 limits.v_xy_max_mps,
                 limits.v_up_max_mps,
                 limits.v_down_max_mps,
                 dod_per_s(vehicle, entry.dod_max),  # the battery is nearly empty then
+                time_scale(vehicle),
                 sensors_of(scenario, entry),
             )
         )
@@ -305,6 +321,8 @@ def _rules(scenario: Scenario, radius_m: float, measured_m: float) -> NDArray[np
     altitudes_m = -scenario.fence.vertices_m[:, 2]
     rules["floor_m"] = altitudes_m.min() + scenario.geofence.margin_m
     rules["ceiling_m"] = altitudes_m.max() - scenario.geofence.margin_m - route_margin_m(scenario)
+    if scenario.planar is not None:
+        rules["floor_m"] = rules["ceiling_m"] = scenario.planar.height_m
     rules["length_scale"] = length_scale(scenario.vehicles, scenario.dt_s)
     rules["clock_reserve_s"] = clock_reserve_s(_CLOCK_RESERVE_S, scenario.max_steps * scenario.dt_s)
     rules["brake"]["kind"] = CLIMB

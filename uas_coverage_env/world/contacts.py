@@ -284,7 +284,7 @@ def check_fence_and_battery(arena, state, outcome):
         outcome[i].fence_clearance_m = -outside_m
         if outside_m > 0.0:
             _record_contact(outcome[i], FENCE, -1)
-        if state.x[i, DOD] > arena.uas[i].dod_max:
+        if state.x[i, DOD] > arena.uas[i].dod_empty:
             _record_contact(outcome[i], BATTERY, -1)
 
 

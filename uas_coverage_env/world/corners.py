@@ -2,7 +2,8 @@
 
 They lie a little outside of what routes avoid. A gap that is only just wide enough lies between two
 such corners that do not see through it: where that leaves waypoints without a way home, they lie
-nearer, by the first of a few distances with which the most have one.
+nearer, by the first of a few distances with which the most have one. Routes also turn in the
+middles of doors (`Scenario.doors_m`), as far as these are outside of what routes avoid.
 """
 
 import math
@@ -81,7 +82,8 @@ def _free_corners(
 ) -> FloatArray:
     """(K, 2) the corners that lie inside the fence and outside of all other tall obstacles."""
     obstacles, normals, offsets_m = planes
-    nodes_m = corners_around(scenario, obstacles, margin_m)
+    doors_m = np.reshape(scenario.doors_m, (-1, 2))
+    nodes_m = np.concatenate([corners_around(scenario, obstacles, margin_m), doors_m])
     places_m = np.column_stack([nodes_m, np.full(len(nodes_m), down_m)])
     inset_m = scenario.geofence.margin_m + margin_m
     free = scenario.fence.signed_distance(places_m) <= -inset_m

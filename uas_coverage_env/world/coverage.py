@@ -108,7 +108,7 @@ def cover(arena, state, sample, outcome):
 
 @inlined_kernel
 def away_from_home_m(uas, x):
-    """Distance of a state from the start of a UAS, a record of the arena [m]."""
+    """Distance of a state from the home of a UAS, a record of the arena [m]."""
     home_m = uas.home_m
     dx = x[X] - home_m[0]
     dy = x[Y] - home_m[1]
@@ -118,7 +118,9 @@ def away_from_home_m(uas, x):
 
 @inlined_kernel
 def land(arena, state, outcome):
-    """Land the UAS that are slow and near their starts, and have left before or return.
+    """Land the UAS that are slow and near their homes, and have left before or return.
+
+    With less charge than the reserve, that is a breach.
 
     A landed UAS rests: no speed, no tilt, no rates; its battery stays as it is.
     """
@@ -132,6 +134,9 @@ def land(arena, state, outcome):
         elif slow and (state.uas[i].departed or outcome[i].returning):
             state.uas[i].status = LANDED
             outcome[i].landed = True
+            if state.x[i, DOD] > arena.uas[i].dod_max:
+                outcome[i].below_reserve = True
+                outcome[i].breaches += 1
             state.uas[i].reference_mps[0] = 0.0
             state.uas[i].reference_mps[1] = 0.0
             for k in range(VX, DOD):

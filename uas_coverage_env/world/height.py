@@ -1,4 +1,4 @@
-"""The least height above ground and roofs, and where it does not hold: near a UAS's start."""
+"""The least height above ground and roofs, and where it does not hold: near start and home."""
 
 from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.entities.outcome import BREACH_TOLERANCE_M
@@ -11,12 +11,18 @@ centimetre [m]."""
 
 @inlined_kernel
 def in_landing_zone(arena, i, x, y):
-    """Whether a place is so near to the start of UAS i that it may fly low there."""
-    home_m = arena.uas[i].home_m
-    dx = x - home_m[0]
-    dy = y - home_m[1]
+    """Whether a place is so near to the start or home of UAS i that it may fly low there."""
     zone_m = arena.rules[0].landing_zone_m
-    return dx * dx + dy * dy <= zone_m * zone_m
+    return _is_within(arena.uas[i].home_m, x, y, zone_m) or _is_within(
+        arena.uas[i].start_m, x, y, zone_m
+    )
+
+
+@inlined_kernel
+def _is_within(place_m, x, y, distance_m):
+    dx = x - place_m[0]
+    dy = y - place_m[1]
+    return dx * dx + dy * dy <= distance_m * distance_m
 
 
 @inlined_kernel

@@ -120,7 +120,8 @@ def obstacle_records(
         low_m, high_m = hull.vertices_m.min(axis=0), hull.vertices_m.max(axis=0)
         record["hull_middle_m"] = (low_m + high_m) / 2
         record["hull_half_m"] = (high_m - low_m) / 2 + EPS_M
-        near = _widened(kept, near_m)
+        # in a planar mission what is kept may be far away, and is nowhere wider than the hull
+        near = _widened(kept if scenario.planar is None else hull, near_m)
         record["first_face"] = first
         record["last_face"] = record["first_side"] = first + hull.n_faces
         first += hull.n_faces + len(sides)

@@ -59,8 +59,8 @@ def pack_records(scenario: Scenario) -> NDArray[np.void]:
     for i, (record, uas) in enumerate(zip(records, scenario.uas, strict=True)):
         seconds, record["dod"] = sorties.swap_s, 1.0 - uas.soc_0
         if scenario.from_ground:
-            up = take_off(scenario, i)
-            down = landing(scenario, i, uas.start_m, uas.dod_max, 0.0)
+            up = take_off(scenario, i, uas.home_m)
+            down = landing(scenario, i, uas.home_m, uas.dod_max, 0.0)
             seconds += down.time_s + up.time_s
             record["dod"], (record["u_th_V"], *further_V) = up.battery
             record["further_V"][: len(further_V)] = further_V

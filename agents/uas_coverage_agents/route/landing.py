@@ -28,7 +28,7 @@ def _homewards(uas, rules, x, speed_mps, values):
     """Write the velocity (north, east) and altitude that flies straight home at a speed."""
     dx, dy = uas.home_m[0] - x[S.X], uas.home_m[1] - x[S.Y]
     way_m, now_mps = math.hypot(dx, dy), math.hypot(x[S.VX], x[S.VY])
-    lead_s = min(LEAD_S, way_m / (2.0 * now_mps + 1e-9))
+    lead_s = min(uas.time_scale * LEAD_S, way_m / (2.0 * now_mps + 1e-9))
     dx, dy = dx - lead_s * x[S.VX], dy - lead_s * x[S.VY]
     length_m = math.hypot(dx, dy) + 1e-9
     values[0], values[1] = speed_mps * dx / length_m, speed_mps * dy / length_m
@@ -47,7 +47,9 @@ def _homewards(uas, rules, x, speed_mps, values):
 def _cautious_mps(uas, x):
     """Speed homewards that comes to rest at home without being planned."""
     way_m = math.hypot(uas.home_m[0] - x[S.X], uas.home_m[1] - x[S.Y])
-    left_m = max(way_m - min(LEAD_S * math.hypot(x[S.VX], x[S.VY]), 0.5 * way_m), 0.0)
+    left_m = max(
+        way_m - min(uas.time_scale * LEAD_S * math.hypot(x[S.VX], x[S.VY]), 0.5 * way_m), 0.0
+    )
     return min(uas.speed_mps, math.sqrt(3.4 * left_m), 0.5 * left_m)
 
 

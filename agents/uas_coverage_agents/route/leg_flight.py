@@ -284,7 +284,9 @@ def over_roofs(arena, x, end_x, end_y, end_altitude_m, uas, leg):
         needed_m = max(needed_m, obstacle.roof_m + arena.rules[0].length_scale * HEADROOM_M)
         rise_m = obstacle.roof_m - altitude_m
         if rise_m > 0.0:
-            speed_mps = min(speed_mps, at * length_m / (rise_m / uas.climb_mps + LEAD_S))
+            speed_mps = min(
+                speed_mps, at * length_m / (rise_m / uas.climb_mps + uas.time_scale * LEAD_S)
+            )
     return needed_m, speed_mps
 
 

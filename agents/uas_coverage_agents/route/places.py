@@ -79,7 +79,10 @@ def places_along(arena, around, i, x, targets, n_targets, ahead):
         north_m, east_m, way_m, round_leg = route(
             around, row, x[S.X], x[S.Y], x[S.Z], to[NORTH], to[EAST], to[DOWN]
         )
-        if round_leg == ROUND_CORNER and way_m / uas.speed_mps < climbing_s + LEAD_S:
+        if (
+            round_leg == ROUND_CORNER
+            and way_m / uas.speed_mps < climbing_s + uas.time_scale * LEAD_S
+        ):
             corner, leg = True, ROUND_CORNER
             ahead[0] = 0.0
             ahead[0, NORTH], ahead[0, EAST], ahead[0, RADIUS] = north_m, east_m, CORNER_M

@@ -111,7 +111,7 @@ def courses_of(labels: list[Label], town_of: Callable[[Label], Scenario]) -> lis
                 for k, w in enumerate(route):
                     places[k, :3] = scenario.waypoints[w].position_m
                     places[k, RADIUS] = scenario.waypoints[w].radius_m
-                places[-1, :3] = scenario.uas[u].start_m
+                places[-1, :3] = scenario.uas[u].home_m
                 places[-1, IS_HOME] = 1.0
                 courses.append(
                     Course(arena.uas[u], arena.vehicles[u], arena.rules[0], places, steps)

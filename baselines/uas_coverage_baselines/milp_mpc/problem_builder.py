@@ -53,15 +53,16 @@ class ProblemBuilder:
         self._view = WorldView(brief)
         self.dt_s = brief.dt_s
         self.waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
-        self.home_m = {uas.name: np.array(uas.start_m, float) for uas in brief.uas}
+        self.home_m = {uas.name: np.array(uas.home_m, float) for uas in brief.uas}
         self._vehicles = dict(zip((u.name for u in brief.uas), brief.vehicles, strict=True))
         self._uas = {uas.name: uas for uas in brief.uas}
         self._row = {uas.name: row for row, uas in enumerate(brief.uas)}
         self._obstacles = tuple(
-            (obstacle.name, hull)
+            (obstacle.name, hull if brief.planar is None else brief.planar.section(hull))
             for obstacle, hull in zip(brief.obstacles, brief.kept_hulls, strict=True)
         )
-        factor = inner_factor(options.waypoint_sides, 3)
+        self._fence = brief.fence if brief.planar is None else brief.planar.section(brief.fence)
+        factor = inner_factor(options.waypoint_sides, 3 if brief.planar is None else 2)
         self._waypoint_reach_m = np.array([w.radius_m * factor for w in brief.waypoints])
         self._waypoint_weight = np.array([w.weight for w in brief.waypoints], float)
 
@@ -70,8 +71,8 @@ class ProblemBuilder:
         return self._vehicles[name]
 
     def seconds_left(self, name: str, dod: float) -> float:
-        """Flight time until DoD_max, at the pace of cruising."""
-        dod_max = self._uas[name].dod_max
+        """Flight time until it has to have landed, at the pace of cruising."""
+        dod_max = self.brief.dod_landed[self._row[name]]
         return (dod_max - dod) / dod_per_s(self._vehicles[name], dod_max)
 
     def seconds_home(self, name: str, position_m: FloatArray) -> float:
@@ -174,7 +175,9 @@ class ProblemBuilder:
     ) -> PlanningProblem:
         """What is seen now, about the given waypoints, which are the scenario's rows."""
         options, names = self._options, swarm.active
-        margin_m, least_m = min(self._margins.fixed_m, 0.1), self.brief.min_height_m
+        margin_m = min(self._margins.fixed_m, 0.1)
+        # in the plane, heights are checked when the file is read
+        least_m = self.brief.min_height_m if self.brief.planar is None else 0.0
         order = self._form.get("order", PlanningProblem.order)
         obstacles = self._within_reach(swarm)
         rows = [swarm.names.index(name) for name in names]
@@ -197,7 +200,7 @@ class ProblemBuilder:
             ),
             x0=x0,
             horizon=options.horizon,
-            fence=self.brief.fence,
+            fence=self._fence,
             fence_margin_m=self.brief.geofence.margin_m + margin_m,
             obstacles=tuple(self._obstacles[o] for o in obstacles),
             obstacle_clearance_m=radius[:, None] + fixed + self._margins.fixed_m,
@@ -212,13 +215,14 @@ class ProblemBuilder:
             waypoint_index=waypoints,
             n_scenario_waypoints=len(self.waypoints_m),
             home_m=np.array([self.home_m[name] for name in names]),
-            dod_max=np.array([u.dod_max for u in uas]),
+            dod_max=np.array([self.brief.dod_landed[self._row[name]] for name in names]),
             targets=(None,) * len(names),
             ways_home=ways_home if any(ways_home) else (),
             dt_s=self.dt_s,
             min_height_m=least_m + margin_m if least_m else 0.0,
             landing_zone_m=self.brief.landing_zone_m - margin_m,
             weights=weights,
+            planar=self.brief.planar is not None,
             **self._form,
         )
 

@@ -35,15 +35,15 @@ class ReturnRule:
         self._vehicles = brief.vehicles
         self._settling_s = [settling_s(vehicle, brief.dt_s) for vehicle in brief.vehicles]
         self._speeds = [speeds_of(vehicle) for vehicle in brief.vehicles]
-        self._dod_max = np.array([uas.dod_max for uas in brief.uas])
+        self._dod_max = np.array(brief.dod_landed)
         self._dod_per_s = np.array(
             [
-                dod_per_s(vehicle, uas.dod_max)
-                for vehicle, uas in zip(brief.vehicles, brief.uas, strict=True)
+                dod_per_s(vehicle, dod)
+                for vehicle, dod in zip(brief.vehicles, brief.dod_landed, strict=True)
             ]
         )
         self._waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
-        self._homes_m = np.array([uas.start_m for uas in brief.uas], float)
+        self._homes_m = np.array([uas.home_m for uas in brief.uas], float)
         self._home_s = np.zeros((len(brief.uas), len(brief.waypoints)))
         if detour is not None:
             for uas, home_s in enumerate(self._home_s):

@@ -125,7 +125,7 @@ class RouteGuide:
         aims = self._legs.waypoints_m[route[: K + 1]]
         radius, lead_s = self._near_enough_m[route[: K + 1]], self._shape.lead_s
         if after is None:  # at home it has to stand still
-            aims = np.vstack([aims, self._legs.starts_m[uas]])
+            aims = np.vstack([aims, self._legs.homes_m[uas]])
             radius, lead_s = np.append(radius, 0.0), 0.0
         onward = np.append(between[route[: K - 1], route[1:K]], last_s)
         return TourSegment(rows, aims, radius, lead_s, onward)

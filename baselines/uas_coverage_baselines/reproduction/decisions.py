@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
@@ -34,7 +35,7 @@ def seen_at(flight: Flight, step: int) -> SwarmState:
         departed=np.ones(len(x), bool),
         returning=np.zeros(len(x), bool),
         uncovered=covered_at(flight) > step,
-        home_m=np.array([uas.start_m for uas in scenario.uas]),
+        home_m=np.array([uas.home_m for uas in scenario.uas]),
         moving_position_m=scenario.moving_positions(time_s),
         moving_velocity_mps=scenario.moving_velocities(time_s),
         responds=np.ones(len(x), bool),
@@ -70,7 +71,8 @@ def whole_decision(flight: Flight, step: int = 0) -> PlanningProblem:
     if len(problem.obstacles) < len(every_obstacle):
         safe_m = np.array([obstacle.safe_distance_m for obstacle in brief.obstacles])
         radius_m = np.array([uas.radius_m for uas in brief.uas if uas.name in problem.names])
-        clearance_m = radius_m[:, None] + safe_m + options.margin_m
+        margins = margins_in(brief, options.margin_m, options.moving_margin_m)
+        clearance_m = radius_m[:, None] + safe_m + margins.fixed_m
         problem = replace(problem, obstacles=every_obstacle, obstacle_clearance_m=clearance_m)
     return replace(problem, physical_sides=options.limit_sides, prune=False)
 

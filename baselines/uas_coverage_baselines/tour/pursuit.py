@@ -31,7 +31,7 @@ HOME_TARGET = -1
 LEGS = 6
 """How many waypoints ahead are aimed at by choice."""
 
-_LAG_S = 1.6  # the inner loop follows a velocity with about this delay
+_LAG_S = 1.6  # the inner loop follows a velocity with about this delay, at scale 1
 _AIM_SHARE = 0.8  # of the radius, at most, for the first aim
 _SPEED_SHARE = 0.97  # of the speed at which a waypoint may be covered, in plans
 _SLOW_SHARE = 0.85  # and in what is pursued
@@ -174,6 +174,7 @@ def _write_step(arena, i, task, plan, k, command, belief):
 def _roofs_ahead(arena, i, x, x1, y1):
     """Altitude that low obstacles on a leg ask for, and the speed that leaves time to climb."""
     needed_m, speed_mps = -math.inf, arena.uas[i].speed_mps
+    lag_s = arena.uas[i].time_scale * _LAG_S
     length_m = math.hypot(x1 - x[S.X], y1 - x[S.Y])
     for o in range(arena.obstacles.shape[0]):
         obstacle = arena.obstacles[o]
@@ -183,7 +184,7 @@ def _roofs_ahead(arena, i, x, x1, y1):
         needed_m = max(needed_m, obstacle.roof_m)
         rise_m = obstacle.roof_m + x[S.Z]
         if rise_m > 0.0:
-            speed_mps = min(speed_mps, at * length_m / (rise_m / arena.uas[i].climb_mps + _LAG_S))
+            speed_mps = min(speed_mps, at * length_m / (rise_m / arena.uas[i].climb_mps + lag_s))
     return needed_m, speed_mps
 
 
@@ -198,16 +199,16 @@ def _pursue(arena, i, task, plan, k):
         x1, y1, z1 = plan.aim_m[leg, 0], plan.aim_m[leg, 1], plan.aim_m[leg, 2]
     end_x, end_y, way_m, kind = route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)
     altitude_m = -z1
-    lead_s = 0.0
+    lead_s, lag_s = 0.0, uas.time_scale * _LAG_S
     if target >= 0 and arena.waypoints[target].max_speed_mps < speed_mps:
         slow_mps = _SLOW_SHARE * arena.waypoints[target].max_speed_mps
         left_m = way_m - _SLOW_WITHIN * arena.waypoints[target].radius_m
-        left_m = max(left_m - _LAG_S * math.hypot(x[S.VX], x[S.VY]), 0.0)
+        left_m = max(left_m - lag_s * math.hypot(x[S.VX], x[S.VY]), 0.0)
         braking_mps2 = 2.0 * _SLOW_BRAKING * task.acceleration_mps2
         speed_mps = min(speed_mps, math.sqrt(slow_mps * slow_mps + braking_mps2 * left_m))
     if target == HOME_TARGET or task.cover_m[leg] < 0.0:
         left_m = max(way_m - (task.near_m[leg] if target >= 0 else 0.0), 0.0)
-        lead_s = min(_LAG_S, left_m / (2.0 * math.hypot(x[S.VX], x[S.VY]) + 1e-9))
+        lead_s = min(lag_s, left_m / (2.0 * math.hypot(x[S.VX], x[S.VY]) + 1e-9))
         left_m = max(left_m - lead_s * math.hypot(x[S.VX], x[S.VY]), 0.0)
         speed_mps = min(speed_mps, math.sqrt(task.acceleration_mps2 * left_m), 0.5 * left_m)
         if target == HOME_TARGET:

@@ -51,7 +51,7 @@ def trouble_alone(fleet: Fleet, uas: int, x: FloatArray, flight: PlannedFlight) 
         return "does not come home"
     if np.linalg.norm(states[-1, S.VX : S.VZ + 1]) > landing.speed_mps:
         return "does not land"
-    if states[-1, S.DOD] > float(fleet.brief.uas[uas].dod_max) - _DOD_RESERVE:
+    if states[-1, S.DOD] > fleet.brief.dod_landed[uas] - _DOD_RESERVE:
         return "the battery does not last"
     return None
 

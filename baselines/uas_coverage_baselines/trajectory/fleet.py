@@ -26,7 +26,7 @@ from uas_coverage_baselines.trajectory.retiming import (
     shifted,
     stretches,
 )
-from uas_coverage_baselines.trajectory.space import Body, space_of
+from uas_coverage_baselines.trajectory.space import TALL_M, Body, space_of
 from uas_coverage_baselines.trajectory.work import Work, done
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.mission.access import Access
@@ -108,7 +108,7 @@ class Fleet:
                 flight_model(arena.vehicles[u], speed_share=speed_share),
                 space_of(arena, u, margin_m),
                 Landing(
-                    np.array(uas.start_m, float), brief.landing_distance_m, brief.landing_speed_mps
+                    np.array(uas.home_m, float), brief.landing_distance_m, brief.landing_speed_mps
                 ),
                 self.waypoints_m,
                 self.radius_m,
@@ -137,7 +137,7 @@ class Fleet:
 
     def bodies(self, moving: MovingObstacles, uas: int) -> list[Body]:
         """What moves, as a UAS keeps clear of it."""
-        return moving.bodies(self.brief.uas[uas].radius_m, self._moving_margin_m)
+        return self._met(moving.bodies(self.brief.uas[uas].radius_m, self._moving_margin_m))
 
     def opens(self, moving: MovingObstacles) -> IntArray:
         """(W,) steps from now at which what moves lets waypoints be covered."""
@@ -191,6 +191,16 @@ class Fleet:
         share = TRAJECTORY_LATER.time_share
         return FreshPacks.seen(self._packs, swarm, until_s, problem, share, is_planned)
 
+    def _met(self, bodies: list[Body]) -> list[Body]:
+        """In a plane: the bodies that come into it, which are passed at one side."""
+        if (planar := self.brief.planar) is None:
+            return bodies
+        return [
+            body._replace(height_m=TALL_M)
+            for body in bodies
+            if (np.abs(body.path_m[:, 2] + planar.height_m) < body.height_m).any()
+        ]
+
     def program(
         self,
         uas: int,
@@ -207,7 +217,7 @@ class Fleet:
         ]
         return replace(
             self.programs[uas],
-            bodies=(*bodies, *moving),
+            bodies=(*self._met(bodies), *moving),
             earliest=earliest,
             solved=0,
         )

@@ -31,6 +31,8 @@ NORMS = np.array([[V_NORTH, V_EAST], [TILT_NORTH, TILT_EAST], [RATE_NORTH, RATE_
 _KEPT_BACK = 2e-4  # share of each limit that is left to the tolerance of the solver
 _ACCELERATION_WEIGHT, _LIFT_WEIGHT = 2e-3, 2e-5  # on squared inputs: break ties, cost no time
 
+_UNUSED_N = 1.0  # either side of a lift that acts on nothing: the search needs room between them
+
 
 class FlightModel(NamedTuple):
     """x(n+1) = A x(n) + B u(n) + drift, and what is allowed of x and u.
@@ -71,6 +73,11 @@ def flight_model(
     for axis, rows in enumerate((slice(NORTH, EAST), slice(EAST, DOWN))):
         A[rows, rows], B[rows, axis] = vehicle.axis_A, vehicle.axis_B
     A[DOWN:, DOWN:], B[DOWN:, N_U - 1] = vehicle.vertical_A, vehicle.vertical_B
+    lift = vehicle.lift_min_N, vehicle.lift_max_N
+    if vehicle.holds_height:
+        # down stays as it is, its rate is zero, and lift acts on nothing: its cost makes it zero
+        A[DOWN:, DOWN:], B[DOWN:, N_U - 1] = np.diag([1.0, 0.0]), 0.0
+        lift = -_UNUSED_N, _UNUSED_N
     share = 1.0 - kept_back
     alpha = [
         min(vehicle.torque_max_Nm[a] / vehicle.inertia_kgm2[a], vehicle.alpha_xy_max_radps2)
@@ -85,8 +92,8 @@ def flight_model(
             [speed_share * vehicle.v_xy_max_mps, vehicle.tilt_max_rad, vehicle.rate_max_radps]
         ),
         vertical=share * np.array([vehicle.v_up_max_mps, vehicle.v_down_max_mps]),
-        input_low=share * np.array([-alpha[0], -alpha[1], vehicle.lift_min_N]),
-        input_high=share * np.array([alpha[0], alpha[1], vehicle.lift_max_N]),
+        input_low=share * np.array([-alpha[0], -alpha[1], lift[0]]),
+        input_high=share * np.array([alpha[0], alpha[1], lift[1]]),
         input_weight=np.array([_ACCELERATION_WEIGHT, _ACCELERATION_WEIGHT, _LIFT_WEIGHT]),
         drift=np.zeros(N_X),
     )

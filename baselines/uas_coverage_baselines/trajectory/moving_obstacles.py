@@ -38,6 +38,7 @@ class MovingObstacles:
         safe_m: (M,) distance that the rules ask for, without the UAS's radius.
         dt_s: Length of a step.
         n_obstacles: How many of them, the first ones, are moving obstacles; the others are UAS.
+        lasts_s: Until the mission ends, at the latest.
     """
 
     position_m: FloatArray
@@ -47,6 +48,7 @@ class MovingObstacles:
     safe_m: FloatArray
     dt_s: float
     n_obstacles: int
+    lasts_s: float
 
     @staticmethod
     def seen(
@@ -75,6 +77,7 @@ class MovingObstacles:
             ),
             brief.dt_s,
             len(obstacles),
+            brief.dt_s * brief.max_steps,
         )
 
     def __len__(self) -> int:
@@ -120,7 +123,7 @@ class MovingObstacles:
         result = []
         for m in range(len(self)):
             parked = np.abs(self.velocity_mps[m]).max() < _STILL_MPS
-            steps = round((_PARKED_S if parked else _SEEN_S) / self.dt_s)
+            steps = round((_PARKED_S if parked else max(_SEEN_S, self.lasts_s)) / self.dt_s)
             keep_m = radius_m + self.safe_m[m] + margin_m + self.surprise_m[m]
             level_m, height_m = self.radius_m[m] + keep_m, self.half_height_m[m] + keep_m
             result.append(Body(self.path_m(m, steps), float(level_m), float(height_m)))

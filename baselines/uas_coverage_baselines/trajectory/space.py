@@ -19,6 +19,9 @@ from uas_coverage_env.world import Arena
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+TALL_M = 1e9
+"""Of what nothing passes over or under in a plane [m]."""
+
 _BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it
 # at scale 1
 _FENCE_MARGIN_M = 0.1
@@ -54,25 +57,29 @@ class Space(NamedTuple):
     length_scale: float
     """See `vehicle.scale`."""
     least_height_m: float
-    """Above the ground, outside of the landing zone; 0: no such rule."""
-    zone_middle_m: FloatArray
-    """(2,) of the landing zone, an upright cylinder."""
+    """Above the ground, outside of the landing zones; 0: no such rule."""
+    zone_middles_m: FloatArray
+    """(2, 2) of the landing zones, upright cylinders around home and start."""
     zone_m: float
-    """Its radius."""
+    """Their radius."""
 
     @property
     def planned_height_m(self) -> float:
-        """The least height that is planned outside of the landing zone."""
+        """The least height that is planned outside of the landing zones."""
         return (
             self.least_height_m + self.length_scale * _HEIGHT_MARGIN_M
             if self.least_height_m > 0.0
             else 0.0
         )
 
+    def in_zones(self, path_m: FloatArray) -> NDArray[np.bool_]:
+        """(2, N) whether places (N, 3) lie in the landing zone around home, around the start."""
+        away_m = path_m[:, :2] - self.zone_middles_m[:, None]
+        return np.hypot(away_m[..., 0], away_m[..., 1]) <= self.zone_m
+
     def is_in_zone(self, path_m: FloatArray) -> NDArray[np.bool_]:
-        """(N,) whether places (N, 3) lie in the landing zone."""
-        away_m = path_m[:, :2] - self.zone_middle_m
-        return np.hypot(away_m[:, 0], away_m[:, 1]) <= self.zone_m
+        """(N,) whether places (N, 3) lie in a landing zone."""
+        return np.asarray(self.in_zones(path_m).any(axis=0))
 
 
 class Body(NamedTuple):
@@ -98,16 +105,20 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         margin_m: Planned beyond the distances that count as a breach.
     """
     rules, obstacles = arena.rules[0], arena.obstacles
-    rows = [np.arange(o["first_face"], o["last_face"]) for o in obstacles]
+    planar = bool(arena.vehicles[uas]["holds_height"])
+    first, last = ("first_kept", "last_kept") if planar else ("first_face", "last_face")
+    rows = [np.arange(o[first], o[last]) for o in obstacles]
     faces = np.concatenate([np.zeros(0, np.int64), *rows])
     least_m = float(arena.uas[uas]["radius_m"]) + obstacles["safe_distance_m"]
     fence = slice(int(rules["fence_first"]), int(rules["fence_last"]))
-    height_m = float(rules["min_height_m"])
+    height_m = 0.0 if planar else float(rules["min_height_m"])
     # over roofs, what the distance to keep leaves of the least height raises the upper faces
     upward = np.maximum(-arena.normals[faces, 2], 0.0)
     of_obstacle = np.repeat(np.arange(len(rows)), [len(row) for row in rows])
     raised_m = np.maximum(height_m * upward - least_m[of_obstacle], 0.0)
     low_m = obstacles["hull_middle_m"] - obstacles["hull_half_m"]
+    if planar:
+        low_m[:, 2] = -TALL_M  # nothing is passed over
     np.minimum.at(low_m[:, 2], of_obstacle, low_m[of_obstacle, 2] - raised_m)
     return Space(
         normals=np.ascontiguousarray(arena.normals[faces]),
@@ -122,13 +133,13 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         fence_margin_m=min(_FENCE_MARGIN_M, margin_m),
         length_scale=float(rules["length_scale"]),
         least_height_m=height_m,
-        zone_middle_m=np.array(arena.uas[uas]["home_m"][:2], float),
+        zone_middles_m=np.array([arena.uas[uas][end][:2] for end in ("home_m", "start_m")], float),
         zone_m=float(rules["landing_zone_m"]),
     )
 
 
 def height_rows(space: Space, path_m: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Planes for the least height: above it, or within the landing zone where a UAS is low there.
+    """Planes for the least height: above it, or within a landing zone where a UAS is low there.
 
     Args:
         space: Of the UAS.
@@ -138,24 +149,26 @@ def height_rows(space: Space, path_m: FloatArray) -> tuple[IntArray, FloatArray,
         Stages (m,), normals (m, 3) and bounds (m,) of rows `normal . p <= bound`.
     """
     stages = np.arange(1, max(len(path_m) - 1, 1))
-    low = space.is_in_zone(path_m[stages])
+    in_home, in_start = space.in_zones(path_m[stages])
+    low = in_home | in_start
     low &= -path_m[stages, 2] < space.planned_height_m + space.length_scale * _MAY_SINK_M
     high = stages[~low]
     angle = 2.0 * np.pi / _ZONE_SIDES * np.arange(_ZONE_SIDES)
     sides = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_ZONE_SIDES)])
     within_m = (space.zone_m - space.length_scale * _ZONE_MARGIN_M) * np.cos(np.pi / _ZONE_SIDES)
-    side_bounds = within_m + sides[:, :2] @ space.zone_middle_m
+    home_bounds, start_bounds = (
+        within_m + sides[:, :2] @ middle_m for middle_m in space.zone_middles_m
+    )
+    side_bounds = np.where(in_home[low, None], home_bounds, start_bounds)
     return (
         np.concatenate([high, np.repeat(stages[low], _ZONE_SIDES)]),
         np.vstack([np.tile([0.0, 0.0, 1.0], (len(high), 1)), np.tile(sides, (int(low.sum()), 1))]),
-        np.concatenate(
-            [np.full(len(high), -space.planned_height_m), np.tile(side_bounds, int(low.sum()))]
-        ),
+        np.concatenate([np.full(len(high), -space.planned_height_m), side_bounds.ravel()]),
     )
 
 
 def spare_height_m(space: Space, path_m: FloatArray) -> float:
-    """Least height beyond what is planned, outside of the landing zone; start and end are free."""
+    """Least height beyond what is planned, outside of the landing zones; start and end are free."""
     if space.least_height_m <= 0.0:
         return np.inf
     outside = path_m[1:-1][~space.is_in_zone(path_m[1:-1])]
@@ -267,9 +280,12 @@ def spare_of_rules_m(space, path_m, lands):
     if space.least_height_m > 0.0:
         least_m = min(space.least_height_m, -path_m[0, 2])
         for n in range(1, n_steps + 1 - (1 if lands else 0)):
-            north_m = path_m[n, 0] - space.zone_middle_m[0]
-            east_m = path_m[n, 1] - space.zone_middle_m[1]
-            if north_m * north_m + east_m * east_m > space.zone_m * space.zone_m:
+            away_m2 = np.inf
+            for zone in range(len(space.zone_middles_m)):
+                north_m = path_m[n, 0] - space.zone_middles_m[zone, 0]
+                east_m = path_m[n, 1] - space.zone_middles_m[zone, 1]
+                away_m2 = min(away_m2, north_m * north_m + east_m * east_m)
+            if away_m2 > space.zone_m * space.zone_m:
                 spare_m = min(spare_m, -path_m[n, 2] - least_m)
     for o in range(len(space.least_m)):
         first, last = space.first[o], space.first[o + 1]

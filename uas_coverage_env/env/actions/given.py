@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from uas_coverage_env.env.actions.in_plane import kind_in
 from uas_coverage_env.env.actions.kind import ActionKind
 from uas_coverage_env.scenario import Scenario
 
@@ -143,11 +144,12 @@ class Choice:
 
 
 def actions_of(kind: ActionKind, scenario: Scenario) -> Actions:
-    """The actions of a kind, scaled to the fleet of a scenario.
+    """The actions of a kind, scaled to the fleet of a scenario; in the plane, those of `kind_in`.
 
     Raises:
         ValueError: Its ranges are not what they should be.
     """
+    kind = kind_in(kind, scenario)
     ranges = kind.scaled_to(scenario)
     return Choice(kind, ranges) if kind.choices else Continuous(kind, ranges, kind.size)
 

@@ -100,19 +100,29 @@ def _express(arena, state, tables, learners, i, parameters, command):
     return north_mps, east_mps, command.altitude_m
 
 
-def _express_finely(arena, state, tables, learners, i, parameters, command):
+def express_landing(arena, state, i, ranges, parameters, command, altitude_m, lowest_m):
+    """Numbers of v1 for the level part of a command that lands exactly where the action does.
+
+    Raises:
+        ValueError: It would land where the command does not, or not where it does.
+    """
     level_mps = _level_mps(arena, i, command)
-    lowest_m = float(tables.ranges[i, 2, 0])
-    altitude_m = max(command.altitude_m, lowest_m)
     lands = asks_to_land(arena, state, i, *level_mps, altitude_m, lowest_m)
     if lands != (command_mode(command) == "return") and not state.uas[i].departed:
         raise ValueError(
             "it has not left its start, and lands there if it asks to hold still at the bottom, "
             "and only then"
         )
-    limit_mps, (slope,) = float(tables.ranges[i, 0, 2]), parameters
-    north, east = (_on_straight_line(each, limit_mps, slope) for each in level_mps)
-    return north, east, command.altitude_m
+    limit_mps, (slope,) = float(ranges[0, 2]), parameters
+    return tuple(_on_straight_line(each, limit_mps, slope) for each in level_mps)
+
+
+def _express_finely(arena, state, tables, learners, i, parameters, command):
+    ranges = tables.ranges[i]
+    lowest_m = float(ranges[2, 0])
+    altitude_m = max(command.altitude_m, lowest_m) if isinstance(command, Velocity) else lowest_m
+    level = express_landing(arena, state, i, ranges, parameters, command, altitude_m, lowest_m)
+    return *level, command.altitude_m
 
 
 VELOCITY = ActionKind(

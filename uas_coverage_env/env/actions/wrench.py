@@ -34,6 +34,7 @@ def _express(arena, state, tables, learners, i, parameters, command):
         raise ValueError("it flies a Wrench")
     refuse_landing_unless_departed(state, i, command)
     values = (command.lift_N, command.tau_x_Nm, command.tau_y_Nm, command.tau_z_Nm)
+    values = values[-len(tables.ranges[i]) :]  # in the plane, without lift
     # as the world saturates its inputs
     limits = zip(values, tables.ranges[i], strict=True)
     return tuple(min(max(value, lowest), highest) for value, (lowest, _, highest) in limits)

@@ -124,6 +124,11 @@ class ScenarioPool:
         )
         actions = [actions_of(settings.kind, scenario) for scenario in self.scenarios]
         self.actions = actions[0]
+        if any(each.kind != self.actions.kind for each in actions):
+            raise ValueError(
+                "some scenarios are planar and some are not, and actions have fewer numbers in the "
+                "plane; fly them in two batches"
+            )
         tables = [
             tables_of(ARENA.mission(worlds.arenas, s), scenario, each.ranges)
             for s, (scenario, each) in enumerate(zip(self.scenarios, actions, strict=True))

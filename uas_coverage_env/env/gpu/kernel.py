@@ -254,7 +254,7 @@ def _look_with(looks: tuple[Any, ...], width: int) -> Any:
 def is_guided(pool: ScenarioPool) -> bool:
     """Whether a step needs guidance."""
     settings = pool.settings
-    return settings.kind.goes_to or settings.return_mode or pool.goes_home
+    return pool.actions.kind.goes_to or settings.return_mode or pool.goes_home
 
 
 def step_with(pool: ScenarioPool) -> tuple[Launch, ...]:
@@ -266,17 +266,17 @@ def step_with(pool: ScenarioPool) -> tuple[Launch, ...]:
     Args:
         pool: What is flown.
     """
-    settings, features = pool.settings, pool.features
+    settings, features, kind = pool.settings, pool.features, pool.actions.kind
     nonlinear, width = settings.dynamics == "nonlinear", settings.observation_size
-    write = settings.kind.write
-    own = all(write is not kind.write for kind in settings.version.actions)
+    write = kind.write
+    own = all(write is not each.write for each in settings.version.actions)
     stages = stages_of(
         _write_command_with(write, own),
         stages_on_gpu(features, nonlinear or pool.sizes["true vehicles"] > 0, settings.return_mode),
         compute_rewards_with(settings.reward, calls=False),
         looks_with(settings.observation, calls=False),
     )
-    parts = [(False, _begin_with(settings.kind.choices, width))]
+    parts = [(False, _begin_with(kind.choices, width))]
     for of_uas, group in groupby(stages.flight, _is_of_uas):
         parts.append((of_uas, _fly_with(tuple(group), nonlinear, is_guided(pool))))
     together = groupby(parts, lambda part: part[0])

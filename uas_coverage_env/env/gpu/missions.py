@@ -151,7 +151,7 @@ class CudaMissions:
         self._rows: Any = on_device(np.zeros(shape, np.float32))
         # all kernels are part of the step
         self._parts = (
-            on_device(acting_of(told.kind, (told.kind,))),
+            on_device(acting_of(pool.actions.kind, (pool.actions.kind,))),
             on_device(paying_of(told.reward, told.weights, told.reward)),
             on_device(observing_of(told.observation, told.observation)),
         )

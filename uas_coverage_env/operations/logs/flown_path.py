@@ -67,19 +67,22 @@ class FlownPath:
     estimates: tuple[Estimate, ...]
     notes: tuple[str, ...]
 
-    def places_at(self, times_s: FloatArray, start_m: FloatArray) -> FloatArray:
-        """(T, 3) where it was at some times [m]: at its start before it left and once home."""
+    def places_at(self, times_s: FloatArray, start_m: FloatArray, home_m: FloatArray) -> FloatArray:
+        """(T, 3) where it was at some times [m]: at its start before it left, home at the end."""
         places_m = interpolated(times_s, self.log.time_s, self.places_m)
         # the ground is under the volume in which missions are judged: how it gets to its start
         # and from there to the ground is no part of them
-        near = np.linalg.norm(places_m[:, :2] - start_m[:2], axis=1) <= BESIDE_M
-        lowest_m = np.where(near, min(start_m[2], 0.0), 0.0)
+        lowest_m = np.zeros(len(times_s))
+        for end_m in (start_m, home_m):
+            near = np.linalg.norm(places_m[:, :2] - end_m[:2], axis=1) <= BESIDE_M
+            lowest_m[near] = np.minimum(lowest_m[near], end_m[2])
         places_m[:, 2] = np.minimum(places_m[:, 2], lowest_m)
-        places_m[self.standing(times_s)] = start_m
+        standing = self.standing(times_s)
+        places_m[standing] = np.where((times_s <= self.left_s)[:, None], start_m, home_m)[standing]
         return places_m
 
     def standing(self, times_s: FloatArray) -> NDArray[np.bool_]:
-        """(T,) whether it stands at its start."""
+        """(T,) whether it stands at its start, or at home."""
         return (times_s <= self.left_s) | (self.home & (times_s >= self.ends_s))
 
     def knows(self, times_s: FloatArray) -> NDArray[np.bool_]:
@@ -106,7 +109,7 @@ def path_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame)
         InputError: The log is of another place.
     """
     uas, log = scenario.uas[i], flight.log
-    start_m = np.array(uas.start_m)
+    start_m, home_m = np.array(uas.start_m), np.array(uas.home_m)
     places_m = frame.to_ned(log.latitude_deg, log.longitude_deg, log.height_m)
     _check_place(scenario, uas.name, places_m)
     top_mps = scenario.vehicles[i].limits.v_xy_max_mps
@@ -131,7 +134,7 @@ def path_of(scenario: Scenario, i: int, flight: LoggedFlight, frame: LocalFrame)
             side = "high" if offset_m > 0.0 else "low"
             how = f"from take-off: an offset of {abs(offset_m):.1f} m (too {side}) is taken off"
             estimates.append(Estimate(uas.name, "height", how))
-    left_s, ends_s, home, said = _ends(scenario, flight, start_m, log.time_s, places_m)
+    left_s, ends_s, home, said = _ends(scenario, flight, (start_m, home_m), log.time_s, places_m)
     return FlownPath(
         flight, log, places_m, left_s, ends_s, home,
         tuple(unknown), doubtful, tuple(estimates), (*notes, *said)
@@ -241,18 +244,19 @@ def _offset_m(start_m: FloatArray, height_m: float) -> float:
 def _ends(
     scenario: Scenario,
     flight: LoggedFlight,
-    start_m: FloatArray,
+    ends_m: tuple[FloatArray, FloatArray],
     times_s: FloatArray,
     places_m: FloatArray,
 ) -> tuple[float, float, bool, list[str]]:
     """Until when it stands at its start, when its way ends, whether that is at home, and notes."""
-    at = _at_home(scenario, start_m, places_m)
+    start_m, home_m = ends_m
+    at_start, at_home = (_is_at(scenario, end_m, places_m) for end_m in ends_m)
     notes = []
     if not flight.by_arming:
-        away = np.flatnonzero(~at)
-        left_s = float(times_s[max(away[0] - 1, 0)]) if len(away) and at[0] else -np.inf
-        home = bool(at[-1])
-        back = min(away[-1] + 1, len(at) - 1) if len(away) else len(at) - 1
+        away = np.flatnonzero(~(at_start | at_home))
+        left_s = float(times_s[max(away[0] - 1, 0)]) if len(away) and at_start[0] else -np.inf
+        home = bool(at_home[-1])
+        back = min(away[-1] + 1, len(times_s) - 1) if len(away) else len(times_s) - 1
         ends_s = float(times_s[back]) if home else float(times_s[-1])
     else:
         ends_s = flight.ends_s
@@ -262,25 +266,26 @@ def _ends(
         if from_start_m > AT_HOME_M:
             taken = ", and is taken to be there" if beside else ""
             notes.append(f"it takes off {from_start_m:.1f} m from its start{taken}")
-        homes_m = [start_m[:2], *([places_m[0, :2]] if beside else [])]
-        near = min(np.linalg.norm(places_m[-1, :2] - home_m) for home_m in homes_m) <= AT_HOME_M
-        low = -places_m[-1, 2] - max(-start_m[2], 0.0) <= _DOWN_M
-        home = bool(near and low) if flight.landed else bool(at[-1])
+        returns = bool((start_m == home_m).all())
+        homes_m = [home_m[:2], *([places_m[0, :2]] if beside and returns else [])]
+        near = min(np.linalg.norm(places_m[-1, :2] - each_m) for each_m in homes_m) <= AT_HOME_M
+        low = -places_m[-1, 2] - max(-home_m[2], 0.0) <= _DOWN_M
+        home = bool(near and low) if flight.landed else bool(at_home[-1])
     if not home:
-        far_m = float(np.linalg.norm(places_m[-1, :2] - start_m[:2]))
+        far_m = float(np.linalg.norm(places_m[-1, :2] - home_m[:2]))
         when, up_m = flight.since(ends_s), -places_m[-1, 2]
         if flight.landed:
-            notes.append(f"it lands away from home, {when}, {far_m:.0f} m from its start")
+            notes.append(f"it lands away from home, {when}, {far_m:.0f} m from it")
         else:
             notes.append(
-                f"its log ends away from home, {when}, {far_m:.0f} m from its start and "
+                f"its log ends away from home, {when}, {far_m:.0f} m from it and "
                 f"{up_m:.0f} m up; what came after is not known"
             )
     return left_s, ends_s, home, notes
 
 
-def _at_home(scenario: Scenario, start_m: FloatArray, places_m: FloatArray) -> NDArray[np.bool_]:
-    """(N,) whether a UAS is on the ground below its start, or on the way to it or from it."""
-    beside_m = np.linalg.norm(places_m[:, :2] - start_m[:2], axis=1)
-    top_m = max(-start_m[2], 0.0) + scenario.landing_distance_m
+def _is_at(scenario: Scenario, end_m: FloatArray, places_m: FloatArray) -> NDArray[np.bool_]:
+    """(N,) whether a UAS is on the ground below its start or home, or on the way to or from it."""
+    beside_m = np.linalg.norm(places_m[:, :2] - end_m[:2], axis=1)
+    top_m = max(-end_m[2], 0.0) + scenario.landing_distance_m
     return (beside_m <= AT_HOME_M) & (-places_m[:, 2] <= top_m)

@@ -232,10 +232,10 @@ class _Judged:
         if i not in self._ways:
             x[:, :3] = uas.start_m
             return x
-        way, start_m = self._ways[i], np.array(uas.start_m)
+        way, ends_m = self._ways[i], (np.array(uas.start_m), np.array(uas.home_m))
         at_s, half_s = self._log_s, 0.5 * self._scenario.dt_s
-        x[:, :3] = way.places_at(at_s, start_m)
-        moved_m = way.places_at(at_s + half_s, start_m) - way.places_at(at_s - half_s, start_m)
+        x[:, :3] = way.places_at(at_s, *ends_m)
+        moved_m = way.places_at(at_s + half_s, *ends_m) - way.places_at(at_s - half_s, *ends_m)
         x[:, S.VX : S.VX + 3] = moved_m / (2.0 * half_s)
         x[way.standing(at_s), S.VX : S.VX + 3] = 0.0
         attitude_rad = way.attitude_at(at_s)

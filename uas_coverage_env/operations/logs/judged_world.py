@@ -154,7 +154,7 @@ def _both(one: NDArray[np.void], other: NDArray[np.void]) -> NDArray[np.void]:
     """What happened in two parts of a step: a breach in both is one."""
     for name in ("newly_covered", "newly_covered_weight"):
         one[name] += other[name]
-    for name in ("breaches", "too_low", "landed", "returning"):
+    for name in ("breaches", "too_low", "below_reserve", "landed", "returning"):
         one[name] = np.maximum(one[name], other[name])
     flying = other["flew"]
     for name in ("obstacle_clearance_m", "separation_m", "fence_clearance_m"):

@@ -35,7 +35,7 @@ class LegCharge:
         planned_soc: The same in the planned flight [-].
         home: What coming home from there takes by the way that is flown when the charge is low,
             with margin (`ReturnPath`) [-].
-        spare: What is left beyond that and the reserve that `dod_max` leaves [-].
+        spare: What is left beyond that and the reserve [-].
         spare_s: How long it can fly on before it has to turn home [s].
     """
 
@@ -109,7 +109,7 @@ def battery_use(
         headwind_mps: The wind [m/s].
     """
     scenario, i = flight.scenario, track.uas
-    uas, vehicle = scenario.uas[i], scenario.vehicles[i]
+    dod_landed, vehicle = scenario.dod_landed[i], scenario.vehicles[i]
     top_mps = vehicle.limits.v_xy_max_mps
     over_ground_mps = max(top_mps - headwind_mps, _LEAST_HEADWAY_MPS)
     against = top_mps / over_ground_mps
@@ -123,7 +123,7 @@ def battery_use(
         dod += dod_per_s(vehicle, min(dod, 1.0)) * takes_s
         per_s = dod_per_s(vehicle, min(dod, 1.0))
         needed = per_s * home.needs_at(float(end_s)) * against
-        spare = uas.dod_max - dod - needed
+        spare = dod_landed - dod - needed
         legs.append(
             LegCharge(
                 time_s=float(end_s) + later_s,
@@ -137,7 +137,7 @@ def battery_use(
         )
     landing_s = followed.duration_s - float(ends[-1])
     soc_landed = 1.0 - dod - dod_per_s(vehicle, min(dod, 1.0)) * landing_s
-    most_home = dod_per_s(vehicle, uas.dod_max) * float(home.needs_s.max()) * against
+    most_home = dod_per_s(vehicle, dod_landed) * float(home.needs_s.max()) * against
     return BatteryUse(tuple(legs), soc_landed, headwind_mps, most_home)
 
 

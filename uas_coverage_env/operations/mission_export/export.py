@@ -250,8 +250,8 @@ def _notes(part: FlightFiles, *, flies: bool) -> list[str]:
         if one.track.lands_elsewhere:
             away_m = math.dist(one.track.home_m, one.track.landing_m)
             notes.append(
-                f"{one.track.name} lands {away_m:.0f} m from where it takes off, since its home "
-                f"was closed; there is its rally point, which only --format qgc holds"
+                f"{one.track.name} lands {away_m:.0f} m from where it takes off: there is its "
+                f"rally point, which only --format qgc holds"
             )
         notes += [f"{one.track.name} {line}" for line in waiting(one)]
         notes += _no_return(one)

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight, covered_at
+from uas_coverage_env.flight.take_offs import TAKE_OFF_HEIGHT_M, Sortie, sorties_of
 from uas_coverage_env.operations.mission_export.leg_builder import SPENT_M, LegBuilder
 from uas_coverage_env.operations.mission_export.tracks import FloatArray, Leg, Tolerances, Track
 from uas_coverage_env.operations.path_geometry import distances_m
-from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M, Sortie, sorties_of
 from uas_coverage_env.world.coverage import covering_samples
 
 _GROUND_M = 0.3
@@ -126,7 +126,7 @@ def _check_in_air(flight: Flight, uas: int, sortie: Sortie, path: FloatArray, fi
 
 def _place_m(flight: Flight, uas: int, sample: int) -> FloatArray:
     """(3,) the home at which a UAS stands at a sample: its first, or that at the end."""
-    homes = np.array([flight.x[0, uas, :3], flight.scenario.uas[uas].start_m])
+    homes = np.array([flight.x[0, uas, :3], flight.scenario.uas[uas].home_m])
     away_m = np.linalg.norm(homes - flight.x[sample, uas, :3], axis=1)
     return homes[1 if away_m[1] <= away_m[0] else 0]
 

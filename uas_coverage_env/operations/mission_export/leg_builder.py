@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.take_offs import Sortie
 from uas_coverage_env.operations.clearance import Surroundings
 from uas_coverage_env.operations.mission_export.tracks import FloatArray, Leg, Tolerances
 from uas_coverage_env.operations.path_geometry import (
@@ -15,7 +16,6 @@ from uas_coverage_env.operations.path_geometry import (
     distances_m,
     leg_distances_m,
 )
-from uas_coverage_env.operations.sorties import Sortie
 
 SPENT_M = 1.0
 """Of a safe distance, what a leg may use: the rest is the autopilot's."""

@@ -176,7 +176,11 @@ def mission_file(
     in_wind = take(start.soc_in_wind, wind_mps) if wind_mps else None
     highest_m = max(-float(flown.places_m[:, 2].min()), home.height_m or 0.0)
     lands_s = _LANDING * landing_s(highest_m, by)
-    limits = {"dod_max": uas.dod_max, "soc_start": start.soc, "soc_fresh": uas.soc_0}
+    limits = {
+        "dod_max": scenario.dod_landed[track.uas],
+        "soc_start": start.soc,
+        "soc_fresh": uas.soc_0,
+    }
     return MissionFile(
         track=track,
         begins_s=start.at_s,

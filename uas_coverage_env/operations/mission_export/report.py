@@ -99,7 +99,7 @@ def _file(part: FlightFiles, one: MissionFile, settings: ExportSettings) -> dict
         "soc_start": round(one.soc_0, 4),
         "soc_landed": round(one.still.soc_landed, 4),
         "planned_soc_landed": round(float(flight.soc[sortie.landed, track.uas]), 4),
-        "soc_reserve": round(1.0 - flight.scenario.uas[track.uas].dod_max, 4),
+        "soc_reserve": round(1.0 - flight.scenario.dod_landed[track.uas], 4),
         "off_path_m": round(track.off_m, 3),
         "spare_room_m": round(room.spare_m, 3),
         "room_to_contact_m": round(room.contact_m, 3),

@@ -14,11 +14,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from uas_coverage_env.flight.take_offs import TAKE_OFF_HEIGHT_M
 from uas_coverage_env.geometry.outline import outline_of
 from uas_coverage_env.operations.clearance import Surroundings
 from uas_coverage_env.operations.mission_export.tracks import Track
 from uas_coverage_env.operations.path_geometry import interpolated
-from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M
 from uas_coverage_env.planning.execution.lateness import apart_m
 from uas_coverage_env.planning.execution.leg_model import (
     DT_S,

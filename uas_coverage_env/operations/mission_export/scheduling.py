@@ -15,6 +15,7 @@ import numpy as np
 
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.take_offs import TAKE_OFF_HEIGHT_M
 from uas_coverage_env.operations.geodesy import LocalFrame
 from uas_coverage_env.operations.mission_export.height_layers import Schedule, in_layers
 from uas_coverage_env.operations.mission_export.mission_file import (
@@ -26,7 +27,6 @@ from uas_coverage_env.operations.mission_export.mission_file import (
 )
 from uas_coverage_env.operations.mission_export.return_paths import Other
 from uas_coverage_env.operations.mission_export.tracks import Tolerances, Track
-from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M
 from uas_coverage_env.planning.execution.lateness import Pair, Timed, kept_m, pairs_of
 from uas_coverage_env.planning.execution.leg_model import Followed
 from uas_coverage_env.planning.execution.separation import Waits, ready_s, separate

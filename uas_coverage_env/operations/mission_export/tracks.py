@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_env.flight.take_offs import Sortie
 from uas_coverage_env.operations.clearance import Clearance
-from uas_coverage_env.operations.sorties import Sortie
 
 FloatArray = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class Track:
         name: Of its file: that of the UAS, and which of its sorties it is, if there are several.
         sortie: Which part of the flight it is.
         home_m: (3,) its start on the ground [m].
-        landing_m: (3,) where it lands, on the ground; elsewhere where its home was closed [m].
+        landing_m: (3,) where it lands, on the ground: its start, or another place [m].
         take_off_m: (3,) where the first leg begins, above the start [m].
         legs: One or more.
         off_m: Largest distance of a sample from its leg [m].

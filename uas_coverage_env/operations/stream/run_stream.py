@@ -9,9 +9,9 @@ from contextlib import ExitStack, closing
 from uas_coverage_env.files.errors import InputError, check_within
 from uas_coverage_env.files.suggestions import check_choice
 from uas_coverage_env.flight import Flight
+from uas_coverage_env.flight.take_offs import sorties_of
 from uas_coverage_env.operations.flight_checks import check_flight
 from uas_coverage_env.operations.geodesy import LocalFrame
-from uas_coverage_env.operations.sorties import sorties_of
 from uas_coverage_env.operations.stream.clock import Clock
 from uas_coverage_env.operations.stream.companion import Companion, Ended, StreamOptions
 from uas_coverage_env.operations.stream.fleet import Fleet

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from uas_coverage_env.flight import Flight
 from uas_coverage_env.flight.record import LANDED
-from uas_coverage_env.operations.sorties import TAKE_OFF_HEIGHT_M
+from uas_coverage_env.flight.take_offs import TAKE_OFF_HEIGHT_M
 from uas_coverage_env.vehicle.layout import VX, VZ
 
 FloatArray = NDArray[np.float64]

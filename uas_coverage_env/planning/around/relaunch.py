@@ -76,7 +76,7 @@ class Relaunch:
         needs_s = out_s + home.time_s + 2.0 * home.time_margin_s  # there as much as back
         left_s = brief.dt_s * (brief.max_steps - swarm.step)
         needs = needs_s * dod_per_s(brief.vehicles[u], float(here[DOD]))
-        return needs_s < left_s and float(here[DOD]) + needs < brief.uas[u].dod_max
+        return needs_s < left_s and float(here[DOD]) + needs < brief.dod_landed[u]
 
     def _is_clear(self, u: int, swarm: SwarmState, going: BoolArray) -> bool:
         """Whether a UAS that flies where it stands keeps all safe distances."""

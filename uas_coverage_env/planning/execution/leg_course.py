@@ -89,7 +89,7 @@ class CoursePlanner:
         self._lift_m = max(_LIFT_M, floor_m + _ABOVE_FLOOR_M)
         if len(brief.uas) > 1:
             apart_m = 2.0 * max(uas.radius_m for uas in brief.uas) + brief.uas_safe_distance_m
-            highest_m = max(-uas.start_m[2] for uas in brief.uas)
+            highest_m = max(max(-uas.start_m[2], -uas.home_m[2]) for uas in brief.uas)
             self._lift_m = max(self._lift_m, highest_m + apart_m + _ABOVE_OTHERS_M)
         spent_m = self._execution.tolerance_m + _TRACKING_M
         self._radius_m = np.array([w.radius_m for w in brief.waypoints])
@@ -110,9 +110,8 @@ class CoursePlanner:
             waypoints: In the order of their visit.
             from_m: (3,) where it is; None: at its start, from which it takes off [m].
         """
-        home_m = np.array(self._brief.uas[uas].start_m)
-        above_m = np.array([*home_m[:2], -max(self._lift_m, -home_m[2])])
-        places = [above_m if from_m is None else np.asarray(from_m, float)]
+        own = self._brief.uas[uas]
+        places = [self._above_m(own.start_m) if from_m is None else np.asarray(from_m, float)]
         speeds: list[float] = []
         leg_of: list[int] = []
         k = 0
@@ -125,8 +124,12 @@ class CoursePlanner:
             leg_of += [len(speeds) - 1] * n
             k += n
         row = len(self._waypoints_m) + uas
-        self._fly_to(row, above_m, places, speeds, self._fastest_mps[uas])
+        self._fly_to(row, self._above_m(own.home_m), places, speeds, self._fastest_mps[uas])
         return Corners(tuple(waypoints), np.array(places), tuple(speeds), tuple(leg_of))
+
+    def _above_m(self, place_m: Sequence[float]) -> FloatArray:
+        """(3,) where legs begin above a start, or end above a home."""
+        return np.array([*place_m[:2], -max(self._lift_m, -place_m[2])])
 
     def course(
         self, uas: int, corners: Corners, waits: Waits | None = None, *, takes_off: bool = True

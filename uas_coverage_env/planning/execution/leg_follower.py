@@ -138,7 +138,9 @@ class LegFollower:
     def _along(self, swarm: SwarmState, u: int, course: Course, route: list[int]) -> Command:
         dt_s, clock_s = self._brief.dt_s, self._clock_s[u]
         behind_m = _at(course, clock_s) - swarm.x[u, :3]
-        if clock_s <= _waits_until_s(course):
+        own = self._brief.uas[u]
+        waits = clock_s <= _waits_until_s(course)
+        if waits:
             behind_m[2] = 0.0  # it waits above its start, not on the ground
         off_m = float(np.linalg.norm(behind_m))
         passes = (_STOPS_AT_M - off_m) / (_STOPS_AT_M - _SLOWER_FROM_M)
@@ -152,7 +154,7 @@ class LegFollower:
         before_m = _at(course, clock_s + _LEAD_S - 0.5 * passes_s)
         rate = (ahead_m - before_m) / dt_s + _PULL_PER_S * behind_m
         height_m = -_at(course, clock_s + passes_s)[2]
-        height_m = max(height_m, -self._brief.uas[u].start_m[2])
+        height_m = max(height_m, -(own.start_m if waits else own.home_m)[2])
         return Velocity(float(rate[0]), float(rate[1]), float(height_m), mode)
 
 

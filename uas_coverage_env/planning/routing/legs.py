@@ -1,4 +1,4 @@
-"""Leg times between waypoints, from where the UAS are and to their starts.
+"""Leg times between waypoints, from where the UAS are and home.
 
 A leg goes straight where the way is free, round tall obstacles along the corners that the world's
 routes turn at, and over low ones. It takes as long as the slower of its horizontal and its
@@ -57,8 +57,8 @@ class Legs:
         arena: The mission as arrays.
         between_s: (V, W, W) between waypoints, for each kind of vehicle, and of what it carries.
         waypoints_m: (W, 3).
-        starts_m: (U, 3).
-        home_s: (U, W) from a waypoint to each UAS's start.
+        homes_m: (U, 3) where they land.
+        home_s: (U, W) from a waypoint to each UAS's home.
         kind: (U,) row of each UAS in `between_s`.
         neighbours: (W, K) the nearest other waypoints of each, nearest first.
         speed_mps: (U,) of each UAS.
@@ -98,7 +98,7 @@ class Legs:
         found = KDTree(self.waypoints_m).query(self.waypoints_m, nearest + 1)[1]
         self.neighbours = _without_self(np.reshape(found, (n, nearest + 1)))
         self._carried = np.array([covers for _, covers in kinds])
-        self.starts_m = np.array([uas.start_m for uas in brief.uas], float)
+        self.homes_m = np.array([uas.home_m for uas in brief.uas], float)
         self._wind: tuple[float, float, float] | None = None
         self._time()
 
@@ -125,7 +125,7 @@ class Legs:
             ]
         )
         self.home_s = np.array(
-            [self._towards_home(u, start) for u, start in enumerate(self.starts_m)]
+            [self._towards_home(u, home_m) for u, home_m in enumerate(self.homes_m)]
         )
 
     def ground_mps(self, uas: int, start_m: FloatArray, end_m: FloatArray) -> float:
@@ -159,14 +159,14 @@ class Legs:
         return np.where(self._can_cover[uas], result, np.inf)
 
     def way_home_s(self, uas: int, position_m: FloatArray) -> float:
-        """Leg time from a position of a UAS to its start."""
+        """Leg time from a position of a UAS to its home."""
         target = np.array([len(self.waypoints_m) + uas])
-        start = self.starts_m[[uas]]
+        home_m = self.homes_m[[uas]]
         here = np.asarray(position_m, float)[None]
         speeds = self._speeds[self.kind[uas]]
-        level_mps, no_credit = self._level_mps(speeds, here, start), np.zeros(1)
+        level_mps, no_credit = self._level_mps(speeds, here, home_m), np.zeros(1)
         return float(
-            _legs_s(self.arena, target, here, start, no_credit, speeds, level_mps, _OCTAGON)[0]
+            _legs_s(self.arena, target, here, home_m, no_credit, speeds, level_mps, _OCTAGON)[0]
         )
 
     def _between(self, speeds: SpeedLimits) -> FloatArray:
@@ -194,9 +194,9 @@ class Legs:
         np.fill_diagonal(straight, 0.0)
         return straight
 
-    def _towards_home(self, uas: int, start_m: FloatArray) -> FloatArray:
+    def _towards_home(self, uas: int, home_m: FloatArray) -> FloatArray:
         n = len(self.waypoints_m)
-        speeds, end_m = self._speeds[self.kind[uas]], np.broadcast_to(start_m, (n, 3))
+        speeds, end_m = self._speeds[self.kind[uas]], np.broadcast_to(home_m, (n, 3))
         return _legs_s(
             self.arena,
             np.full(n, n + uas),

@@ -36,7 +36,7 @@ ROUTED_UAS_DTYPE = record_dtype(
         ("position_m", "f8", (2,)),
         ("velocity_mps", "f8", (2,)),
         # where it has to land
-        ("start_m", "f8", (2,)),
+        ("home_m", "f8", (2,)),
         # cruising, and how fast the velocity can change
         ("speed_mps", "f8"),
         ("acceleration_mps2", "f8"),
@@ -142,7 +142,7 @@ class RoutingProblem:
         uas = np.zeros(n_uas, ROUTED_UAS_DTYPE)
         uas["kind"], uas["flown_by"] = own.kind, np.arange(n_uas)
         uas["position_m"], uas["velocity_mps"] = x[:, :2], x[:, VX : VY + 1]
-        uas["start_m"] = own.starts_m[:, :2]
+        uas["home_m"] = own.homes_m[:, :2]
         uas["speed_mps"] = speed_share * own.speed_mps
         uas["acceleration_mps2"] = own.acceleration_mps2
         way_home_s = np.array([own.way_home_s(u, x[u, :3]) for u in range(n_uas)])

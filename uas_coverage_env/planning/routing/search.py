@@ -235,7 +235,7 @@ def arrays_of(problem: RoutingProblem, total_weight: float) -> RoutingArrays:
     release_s = np.tile(problem.release_s, (problem.n_uas, 1))
     release_s[follows] = 0.0  # when a later trip takes off, everything is taken to be released
     release_s[problem.forbidden] = _FORBIDDEN_S
-    place = np.vstack([problem.waypoints_m[:, :2], uas["position_m"], uas["start_m"]])
+    place = np.vstack([problem.waypoints_m[:, :2], uas["position_m"], uas["home_m"]])
     return RoutingArrays(
         uas=uas,
         first=problem.first_s,

@@ -28,9 +28,11 @@ _ABOVE_M = 1.0
 def raised(brief: MissionBrief) -> MissionBrief | None:
     """The mission with what rises above the usual waypoint made as tall as the fence.
 
-    None where nothing does, and routes would be the same.
+    None where nothing does, and routes would be the same; in a plane all obstacles are tall.
     """
-    targets_m = [*(w.position_m[2] for w in brief.waypoints), *(u.start_m[2] for u in brief.uas)]
+    if brief.planar is not None:
+        return None
+    targets_m = [*(w.position_m[2] for w in brief.waypoints), *(u.home_m[2] for u in brief.uas)]
     usual_m = float(np.median(targets_m)) - _ABOVE_M
     top_m = float(brief.fence.vertices_m[:, 2].min())
     radius_m = max(uas.radius_m for uas in brief.uas)

@@ -46,7 +46,7 @@ class RouteWindow:
                 rest_s = between[rest[:-1], rest[1:]].sum() + problem.home_s[u, rest[-1]]
                 home_s[u] = between[:, rest[0]] + rest_s
                 uas["idle_s"][u] = problem.first_s[u, rest[0]] + rest_s
-                uas["start_m"][u] = problem.waypoints_m[rest[0], :2]
+                uas["home_m"][u] = problem.waypoints_m[rest[0], :2]
         near = np.isin(order.left_out, problem.neighbours[np.concatenate(first)])
         left_out = order.left_out[near]
         open_waypoints = np.concatenate([*first, left_out])

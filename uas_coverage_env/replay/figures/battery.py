@@ -56,7 +56,7 @@ def battery_figure(flight: Flight, *, published: bool | None = None) -> Figure:
         for axis, (label, _) in zip(axes, _PANELS, strict=True):
             axis.set_ylabel(label)
             axis.margins(x=0.01)
-        for floor in sorted({1.0 - uas.dod_max for uas in flight.scenario.uas}):
+        for floor in sorted({1.0 - dod for dod in flight.scenario.dod_landed}):
             axes[0].axhline(100 * floor, color=shade(colours.RED), linewidth=0.8, linestyle=":")
         axes[0].set_ylim(bottom=0)
         axes[-1].set_xlabel("Time, s")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.labels import Box, free_place, overlap, short_name
 from uas_coverage_env.draw.marks import heavy_waypoints
-from uas_coverage_env.draw.terrain import height_words
+from uas_coverage_env.draw.terrain import height_words, lintels
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import MODES, Flight, seen_ground
 from uas_coverage_env.flight.scene_history import SceneHistory
@@ -126,11 +126,14 @@ def _terrain(axes: Axes, scenario: Scenario) -> None:
         tint = colours.of_decoration(item.kind)
         corners = _flat(np.array(item.polygon_m))
         axes.add_patch(Polygon(corners, facecolor=shade(tint), edgecolor="none"))
-    for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
+    for obstacle, hull, overhead in zip(
+        scenario.obstacles, scenario.hulls, lintels(scenario), strict=True
+    ):
         tint = colours.of_obstacle(obstacle.kind)
-        edge = shade(colours.shaded(tint, 0.6))
+        face = "none" if overhead else shade(tint)
+        edge = shade(colours.FAINT if overhead else colours.shaded(tint, 0.6))
         corners = _flat(outline_of(hull.vertices_m))
-        axes.add_patch(Polygon(corners, facecolor=shade(tint), edgecolor=edge, linewidth=0.6))
+        axes.add_patch(Polygon(corners, facecolor=face, edgecolor=edge, linewidth=0.6))
     axes.add_patch(Polygon(fence, fill=False, edgecolor=shade(colours.INK), linewidth=1.2))
 
 
@@ -172,7 +175,7 @@ def _heights(
     ).reshape(-1, 3)
     heights = []
     for obstacle, hull in zip(scenario.obstacles, scenario.hulls, strict=True):
-        words = height_words(hull)
+        words = height_words(hull, scenario.fence)
         box_m = m_per_pt * _LABEL_PT * np.array([_LETTER * len(words), 1.1])
         place = free_place(_flat(outline_of(hull.vertices_m)), box_m, discs_m)
         if place is not None:

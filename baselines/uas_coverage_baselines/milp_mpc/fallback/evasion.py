@@ -72,7 +72,7 @@ def _flights(
     angles = 2.0 * np.pi * np.arange(_HEADINGS) / _HEADINGS
     level = [(0.0, 0.0)]
     level += [(limits.v_xy_max_mps * np.cos(a), limits.v_xy_max_mps * np.sin(a)) for a in angles]
-    down = (0.0, -limits.v_up_max_mps, limits.v_down_max_mps)
+    down = (0.0,) if problem.planar else (0.0, -limits.v_up_max_mps, limits.v_down_max_mps)
     pushes = [int(np.ceil(push_s / dt_s)) for push_s in _PUSHES_S]
     ways = [(0.0, 0.0, 0.0, 0)]
     ways += [(*a, d, push) for a, d, push in product(level, down, pushes) if (*a, d) != (0, 0, 0)]

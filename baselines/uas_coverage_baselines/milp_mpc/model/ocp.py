@@ -32,7 +32,7 @@ from uas_coverage_baselines.milp_mpc.model.blocks.time_to_go import TimeToGo
 from uas_coverage_baselines.milp_mpc.model.milp import ELIMINATED, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.mission import MissionBrief
-from uas_coverage_env.vehicle.layout import N_INPUTS, N_STATES
+from uas_coverage_env.vehicle.layout import LIFT, N_INPUTS, N_STATES, Z
 from uas_coverage_env.world import SwarmState
 
 
@@ -139,8 +139,13 @@ def shared_variables(
     open_now[0] = 1.0
     made_x = None if states is None else states[:, None, :]
     made_u = None if inputs is None else inputs[:, None, :]
+    if problem.planar:
+        made_x = np.isin(range(N_STATES), problem.states) & (made_x is None or made_x)
+        made_u = (np.arange(N_INPUTS) != LIFT) & (made_u is None or made_u)
     x = milp.variables("x", (U, N + 1, N_STATES), lower=lower, upper=upper, where=made_x)
     u = milp.variables("u", (U, N, N_INPUTS), where=made_u)
+    if problem.planar:
+        x[..., Z] = ELIMINATED  # vertical speed and lift are zero, the height is not
     covers = milp.variables(
         "covers", (U, N, W), lower=0.0, upper=1.0, integer=True, where=coverable(problem)
     )

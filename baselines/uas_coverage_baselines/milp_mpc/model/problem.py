@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from uas_coverage_baselines.milp_mpc.model.milp import Columns
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import NormBounds, norm_bounds
 from uas_coverage_baselines.milp_mpc.model.reachability import Reach
-from uas_coverage_env.geometry import ConvexPolytope
+from uas_coverage_env.geometry import ConvexPolytope, cylinder_faces, sphere_faces
+from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
 from uas_coverage_env.vehicle import LinearModel, VehicleParams
-from uas_coverage_env.vehicle.layout import VX, VZ
+from uas_coverage_env.vehicle.layout import N_STATES, VX, VZ, Z
 
 FloatArray = NDArray[np.float64]
 NEVER = 10_000
@@ -193,6 +194,9 @@ class PlanningProblem:
         outer_limits: whether these polygons lie around the limits (c_in = 1), not inside of them.
         obstacle_sides: H_O.
         waypoint_sides: H_WP.
+        planar: whether all UAS keep one height, as in the paper's earlier two-dimensional form:
+            z, v_z and lift have no columns, and no row or binary is about heights. All normals of
+            fence and obstacles are level then.
         order: N_dis, of the series in `models`.
         corners_of_all: whether moving obstacles and pairs of UAS have corner cutting constraints,
             too; fixed obstacles always have.
@@ -232,6 +236,7 @@ class PlanningProblem:
     obstacle_sides: int = 8
     waypoint_sides: int = 4
     outer_limits: bool = False
+    planar: bool = False
     order: int = 4
     corners_of_all: bool = True
     prune: bool = True
@@ -253,6 +258,20 @@ class PlanningProblem:
     def n_waypoints(self) -> int:
         """W."""
         return len(self.waypoints_m)
+
+    @property
+    def states(self) -> list[int]:
+        """The states that the program moves: all; in the plane without z and v_z."""
+        return [s for s in range(N_STATES) if not (self.planar and s in (Z, VZ))]
+
+    @property
+    def waypoint_faces(self) -> FloatArray:
+        """(F, 3) of the sphere around a waypoint; in the plane, of the circle."""
+        return (cylinder_faces if self.planar else sphere_faces)(self.waypoint_sides)
+
+    def closed_faces(self, sides: int) -> FloatArray:
+        """(sides + 2, 3) of a closed cylinder; in the plane, (sides, 3) without its ends."""
+        return (cylinder_faces if self.planar else closed_cylinder_faces)(sides)
 
     @property
     def assigned(self) -> NDArray[np.bool_]:

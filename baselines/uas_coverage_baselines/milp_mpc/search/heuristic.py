@@ -24,7 +24,6 @@ from uas_coverage_baselines.milp_mpc.model.problem import (
 )
 from uas_coverage_baselines.milp_mpc.search.trajectories import PlannedTrajectory
 from uas_coverage_env.compiled.kernels import allocating_kernel
-from uas_coverage_env.geometry import sphere_faces
 from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import compile_vehicle
 from uas_coverage_env.vehicle.inner_loop import velocity_climb_wrench
@@ -73,7 +72,7 @@ def construct(
             sequences,
             problem.waypoints_m,
             problem.waypoint_reach_m,
-            sphere_faces(problem.waypoint_sides),
+            problem.waypoint_faces,
             keep_out,
             aim,
             lead_s,

@@ -70,7 +70,7 @@ _JOINT_NODES = 1  # the root: its bound and what comes of the start
 _JOINT_SHARE = 0.6  # of the work: the most that is kept for the joint program
 _AT_LEAST, _AT_MOST = 1.1, 2.0  # of the work: with which it is solved, with which all ends
 _WAVE = 4  # programs after which the work is counted, whatever the number of threads
-# 1 is 0.85 s of a quiet core (docs/solvers.md); the rest of a second is for all but programs
+# 1 is 0.85 s of a quiet core (docs/paper_program.md); the rest of a second is for all but programs
 _PER_ENTRY, _PER_ITERATION_AND_ROW = 6e-7, 3.5e-8
 _JOINT_DEARER = 3.0  # than its iterations say: cuts at the root, rows beyond the cache
 _PROGRAMS_EACH = 2  # at least, of a UAS that is planned for

@@ -230,12 +230,12 @@ PARAMETERS: tuple[Parameter, ...] = (
         px4("RTL_TYPE", INT32),
     ),
     Parameter(
-        "return: to home; 0 where it was closed",
+        "return: to home; 0 where it lands elsewhere",
         lambda f: 0 if f.one.track.lands_elsewhere else 1,
         copter("RALLY_INCL_HOME", INT8),
     ),
     Parameter(
-        "return: to the rally point, however far, where home was closed",
+        "return: to the rally point, however far, where it lands elsewhere",
         lambda f: 0.0 if f.one.track.lands_elsewhere else None,
         copter("RALLY_LIMIT_KM", FLOAT, "km"),
     ),

@@ -163,11 +163,16 @@ def _towards_m(problem: PlanningProblem, uas: int) -> FloatArray:
 
 
 def _time_faces(problem: PlanningProblem, uas: int) -> FloatArray:
-    """(2 H_P, 3) rows whose largest value along the way from home is the time it takes [s/m]."""
+    """Rows whose largest value along the way from home is the time it takes [s/m].
+
+    (2 H_P, 3), one for each sense of a climb; (H_P, 3) in the plane.
+    """
     speeds = speeds_of(problem.vehicles[uas])
     # the faces measure the norm from below by at most this factor
     level = cylinder_faces(problem.physical_sides) / np.cos(np.pi / problem.physical_sides)
     level = level_seconds(MILP_RESERVE, speeds, level)
+    if problem.planar:
+        return level
     down = np.array([0.0, 0.0, vertical_seconds(speeds, 0.0, 1.0)])
     return np.vstack([level + down, level - down])
 

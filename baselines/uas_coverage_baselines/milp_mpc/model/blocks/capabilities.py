@@ -102,7 +102,8 @@ class Capabilities:
             (per_tilt * trim * turned, velocity),
             lower=0.0,
         )
-        for name in ("climb", "descent"):
+        # without climbs both rows are the same
+        for name in ("climb",) if problem.planar else ("climb", "descent"):
             per_climb = np.array([getattr(c, f"{name}_N_per_mps") for c in corrections])
             milp.subject_to(
                 f"thrust.correction_{name}",

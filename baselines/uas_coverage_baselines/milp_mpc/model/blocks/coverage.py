@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Columns, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
-from uas_coverage_env.geometry import cylinder_faces, sphere_faces
+from uas_coverage_env.geometry import cylinder_faces
 
 
 def coverable(problem: PlanningProblem) -> NDArray[np.bool_]:
     """(U, N, W) True where the waypoint's inner polyhedron can be reached at that step."""
     if not problem.n_waypoints:
         return np.zeros((problem.n_uas, problem.horizon, 0), bool)
-    faces = sphere_faces(problem.waypoint_sides)
+    faces = problem.waypoint_faces
     nearest = problem.waypoints_m @ faces.T - problem.waypoint_reach_m[:, None]
     reach = problem.reach.support(faces)[:, :-1, None, :]
     result = np.asarray((reach >= nearest).all(axis=-1))
@@ -54,7 +54,7 @@ def uncovered_as(
 
 def require_inside(milp: Milp, v: Variables, problem: PlanningProblem) -> None:
     """|p_w - p(n)| <= delta_WP where b_W(n) = 1: a row per UAS, step, waypoint and face."""
-    faces = sphere_faces(problem.waypoint_sides)
+    faces = problem.waypoint_faces
     center = problem.waypoints_m @ faces.T
     upper = center + problem.waypoint_reach_m[:, None]
     reach = problem.reach.support(faces)[:, :-1, None, :]

@@ -22,12 +22,13 @@ class Dynamics:
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
         """Add the rows; x(0) is fixed by the bounds of its columns."""
-        A = np.array([model.A for model in problem.models])
-        B = np.array([model.B for model in problem.models])
-        E = np.array([model.E for model in problem.models])
+        states = problem.states
+        A = np.array([model.A[states] for model in problem.models])
+        B = np.array([model.B[states] for model in problem.models])
+        E = np.array([model.E[states] for model in problem.models])
         milp.subject_to(
             "dynamics",
-            (1.0, v.x[:, 1:, :, None]),
+            (1.0, v.x[:, 1:, states, None]),
             (-A[:, None], v.x[:, :-1, None, :]),
             (-B[:, None], v.u[:, :, None, :]),
             lower=E[:, None, :],

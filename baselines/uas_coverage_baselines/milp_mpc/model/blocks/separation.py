@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Variables
-from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
 
 FloatArray = NDArray[np.float64]
 _ON_FACE_M = 1e-6
@@ -250,14 +249,19 @@ def from_obstacles(problem: PlanningProblem) -> Iterator[Separation]:
 
 def from_moving_obstacles(problem: PlanningProblem) -> Iterator[Separation]:
     """Every UAS from each moving obstacle's predicted closed cylinder."""
-    faces = closed_cylinder_faces(problem.obstacle_sides)
+    faces = problem.closed_faces(problem.obstacle_sides)
     swarm = np.arange(problem.n_uas)
     highest, lowest = problem.reach.support(faces), -problem.reach.support(-faces)
     for row, moving in enumerate(problem.moving):
         offset = -(moving.position_m @ faces.T)
         offset = np.broadcast_to(offset, (problem.n_uas, *offset.shape))
         size = np.full(len(faces), moving.radius_m)
-        size[-2:] = moving.half_height_m
+        if problem.planar:
+            down_m = np.abs(moving.position_m[:, 2] - problem.x0[:, [2]]) - moving.half_height_m
+            if (down_m >= problem.moving_clearance_m[:, [row]]).all():
+                continue  # passes over or under the plane
+        else:
+            size[-2:] = moving.half_height_m
         clearance = size + problem.moving_clearance_m[:, [row]]
         yield Separation(
             moving.name,
@@ -278,7 +282,7 @@ def from_each_other(problem: PlanningProblem) -> Iterator[Separation]:
     first, second = np.triu_indices(problem.n_uas, k=1)
     if not len(first):
         return
-    faces = closed_cylinder_faces(problem.obstacle_sides)
+    faces = problem.closed_faces(problem.obstacle_sides)
     ahead, behind = problem.reach.support(faces), problem.reach.support(-faces)
     clearance = np.repeat(problem.separation_m[first, second][:, None], len(faces), axis=1)
     lowest, highest = -(behind[first] + ahead[second]), ahead[first] + behind[second]

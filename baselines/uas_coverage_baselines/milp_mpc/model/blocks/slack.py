@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uas_coverage_baselines.milp_mpc.model.milp import Milp
+from uas_coverage_baselines.milp_mpc.model.milp import ABSENT, Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
 from uas_coverage_env.vehicle import layout as S
 
@@ -37,7 +37,7 @@ class Slack:
             ("yaw", v.x[:, 1:, S.PSI], w.yaw, limit("yaw_max_rad")),
             ("climb", v.x[:, 1:, S.VZ], w.climb, limit("v_down_max_mps")),
         ):
-            if weight == 0.0:
+            if weight == 0.0 or (columns == ABSENT).all():
                 continue
             slack = milp.variables(f"slack.{name}", columns.shape, lower=0.0)
             for side, sign in (("above", -1.0), ("below", 1.0)):

@@ -7,7 +7,6 @@ import numpy as np
 from uas_coverage_baselines.milp_mpc.model.blocks.coverage import uncovered_as
 from uas_coverage_baselines.milp_mpc.model.milp import Milp
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem, Trajectories, Variables
-from uas_coverage_env.geometry.round_shapes import closed_cylinder_faces
 
 
 class TargetDistance:
@@ -27,7 +26,7 @@ class TargetDistance:
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
         """Add the distance of every UAS that has a target."""
-        faces = closed_cylinder_faces(problem.physical_sides)
+        faces = problem.closed_faces(problem.physical_sides)
         reach = problem.reach.support(faces)
         for uas, target in enumerate(problem.targets):
             if target is None:
@@ -53,7 +52,7 @@ class TargetDistance:
         target = problem.targets[uas]
         if target is None:
             return np.zeros(len(flights.positions_m))
-        faces = closed_cylinder_faces(problem.physical_sides)
+        faces = problem.closed_faces(problem.physical_sides)
         distance = ((flights.positions_m[:, 1:] - target.position_m) @ faces.T).max(axis=2)
         if target.waypoint is not None:
             steps = np.arange(1, problem.horizon + 1)

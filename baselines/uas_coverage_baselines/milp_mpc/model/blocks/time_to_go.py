@@ -35,7 +35,9 @@ class TimeToGo:
             if tour is None:
                 continue
             name = f"time_to_go.{problem.names[uas]}"
-            rates, slack = flight_time_faces(problem.vehicles[uas], problem.physical_sides)
+            rates, slack = flight_time_faces(
+                problem.vehicles[uas], problem.physical_sides, problem.planar
+            )
             there = tour.aims_m @ rates.T + tour.radius_m[:, None] * slack  # (K+1, F)
             distance = milp.variables(f"{name}.distance", (1,), lower=0.0)
             open_at_end = v.uncovered[-1, tour.waypoints]
@@ -68,7 +70,9 @@ class TimeToGo:
         if tour is None:
             return np.zeros(len(flights.positions_m))
         positions_m = flights.positions_m
-        rates, slack = flight_time_faces(problem.vehicles[uas], problem.physical_sides)
+        rates, slack = flight_time_faces(
+            problem.vehicles[uas], problem.physical_sides, problem.planar
+        )
         offset = tour.aims_m @ rates.T + tour.radius_m[:, None] * slack
         visited = flights.visits[:, tour.waypoints] < problem.horizon
         prefix = np.cumprod(visited, axis=1).astype(bool)
@@ -79,20 +83,23 @@ class TimeToGo:
         return (~prefix) @ tour.onward_s + distance
 
 
-def flight_time_faces(vehicle: VehicleParams, sides: int) -> tuple[FloatArray, FloatArray]:
+def flight_time_faces(
+    vehicle: VehicleParams, sides: int, planar: bool = False
+) -> tuple[FloatArray, FloatArray]:
     """Rows whose largest value along a way is the time it takes.
 
     Args:
         vehicle: whose speed limits.
         sides: H_P.
+        planar: without heights.
 
     Returns:
-        rates: (sides + 2, 3) [s/m] horizontal faces, up, down.
+        rates: (sides + 2, 3) [s/m] horizontal faces, up, down; these two not in the plane.
         slack: (sides + 2,) [s/m] what a metre of radius around the aim is worth on each.
     """
     limits = vehicle.limits
     level = cylinder_faces(sides) / limits.v_xy_max_mps
     up = np.array([[0.0, 0.0, 1.0 / limits.v_up_max_mps]])  # below the aim: z is larger
     down = np.array([[0.0, 0.0, -1.0 / limits.v_down_max_mps]])
-    rates = np.vstack([level, up, down])
+    rates = level if planar else np.vstack([level, up, down])
     return rates, np.linalg.norm(rates, axis=1)

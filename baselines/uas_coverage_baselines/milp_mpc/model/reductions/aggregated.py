@@ -22,7 +22,6 @@ from uas_coverage_baselines.milp_mpc.model.reductions.travel import (
     partition,
     steps_between,
 )
-from uas_coverage_env.geometry import sphere_faces
 
 
 class AggregatedBoxes:
@@ -30,7 +29,7 @@ class AggregatedBoxes:
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
         """Add rows for groups of waypoints, of which there is one unless boxes overlap."""
-        faces = sphere_faces(problem.waypoint_sides)
+        faces = problem.waypoint_faces
         limit = problem.waypoints_m @ faces.T + problem.waypoint_reach_m[:, None]  # (W, F)
         steps = steps_between(problem)
         for uas, name in enumerate(problem.names):

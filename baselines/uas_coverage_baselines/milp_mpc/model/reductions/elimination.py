@@ -57,10 +57,11 @@ class MotionDynamics:
 
     def add_to(self, milp: Milp, v: Variables, problem: PlanningProblem) -> None:
         """Add the rows; those of a yaw at rest read 0 = 0 and are not made."""
-        A = np.array([model.A[np.ix_(_MOTION, _MOTION)] for model in problem.models])
-        B = np.array([model.B[_MOTION] for model in problem.models])
-        E = np.array([model.E[_MOTION] for model in problem.models])
-        x = v.x[:, :, _MOTION]
+        motion = [state for state in _MOTION if state in problem.states]
+        A = np.array([model.A[np.ix_(motion, motion)] for model in problem.models])
+        B = np.array([model.B[motion] for model in problem.models])
+        E = np.array([model.E[motion] for model in problem.models])
+        x = v.x[:, :, motion]
         milp.subject_to(
             "dynamics",
             (1.0, x[:, 1:, :, None]),

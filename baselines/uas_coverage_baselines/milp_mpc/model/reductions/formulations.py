@@ -51,6 +51,7 @@ from uas_coverage_baselines.milp_mpc.model.reductions.lifted import LiftedBoxes
 from uas_coverage_baselines.milp_mpc.model.reductions.one_face import OneFacePerInterval
 from uas_coverage_baselines.milp_mpc.model.reductions.paper import PaperCornerCutting, PaperCoverage
 from uas_coverage_baselines.milp_mpc.model.reductions.visit_order import VisitOrder
+from uas_coverage_env.vehicle.layout import LIFT, VZ
 
 
 def _as_it_is(milp: BuiltMilp) -> BuiltMilp:
@@ -124,7 +125,7 @@ class Formulation:
         reduced = [*self.tightened_by, *(new for group in self.replaces.values() for new in group)]
         for block in self.of(blocks):
             ours = any(block is one for one in reduced)
-            block.add_to(milp, v if ours else _without_zeros(v), problem)
+            block.add_to(milp, v if ours else _without_zeros(v, problem), problem)
         return milp, v
 
     def build(
@@ -135,9 +136,12 @@ class Formulation:
         return self.finish(milp.build()), v
 
 
-def _without_zeros(v: Variables) -> Variables:
+def _without_zeros(v: Variables, problem: PlanningProblem) -> Variables:
     """The columns for a block of the OCP: a state that is zero without it is none it may use."""
     x, u = (np.where(columns == ABSENT, ELIMINATED, columns) for columns in (v.x, v.u))
+    if problem.planar:
+        # these are zero whatever the block does
+        x[..., VZ] = u[..., LIFT] = ABSENT
     return replace(v, x=x, u=u)
 
 

@@ -24,7 +24,7 @@ from uas_coverage_baselines.milp_mpc.model.reductions.travel import (
     steps_between,
     support_of_waypoints,
 )
-from uas_coverage_env.geometry import cylinder_faces, sphere_faces
+from uas_coverage_env.geometry import cylinder_faces
 
 _WINDOW = 3
 
@@ -61,7 +61,7 @@ class LiftedBoxes:
 
 def _directions(problem: PlanningProblem):
     """Faces of a waypoint's polyhedron; of a box the four horizontal diagonals, too."""
-    faces = sphere_faces(problem.waypoint_sides)
+    faces = problem.waypoint_faces
     known, support = support_of_waypoints(problem)
     if problem.waypoint_sides > 4:
         return known, support

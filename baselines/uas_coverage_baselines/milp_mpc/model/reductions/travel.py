@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
-from uas_coverage_env.geometry import cylinder_faces, sphere_faces
+from uas_coverage_env.geometry import cylinder_faces
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def support_of_waypoints(problem: PlanningProblem) -> tuple[FloatArray, FloatArr
 
     These are its faces; where it is a box, directions between the faces too.
     """
-    faces = sphere_faces(problem.waypoint_sides)
+    faces = problem.waypoint_faces
     reach = problem.waypoint_reach_m[:, None]
     if problem.waypoint_sides > 4:
         return faces, np.broadcast_to(reach, (problem.n_waypoints, len(faces)))

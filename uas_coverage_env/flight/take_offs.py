@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uas_coverage_env.flight import Flight
-from uas_coverage_env.flight.record import LANDED
+from uas_coverage_env.flight.record import LANDED, FlightRecord
 from uas_coverage_env.world.packs import pack_records
 
 TAKE_OFF_HEIGHT_M = 3.0
@@ -18,7 +17,7 @@ class Sortie(NamedTuple):
 
     Attributes:
         first: The sample at which the UAS begins, at rest on the ground.
-        landed: The first sample at which it has landed.
+        landed: The first sample at which it has landed, or is lost.
         rest_s: How long it was on the ground before; 0 for the first one [s].
         fresh: Whether it flies with a fresh pack.
     """
@@ -29,8 +28,10 @@ class Sortie(NamedTuple):
     fresh: bool = True
 
 
-def sorties_of(flight: Flight, uas: int) -> list[Sortie]:
-    """All sorties of a UAS that has landed, in their order; none where it was never up.
+def sorties_of(flight: FlightRecord, uas: int) -> list[Sortie]:
+    """All sorties of a UAS, in their order; none where it was never up.
+
+    Where it is still in the air at the end, its last one ends there.
 
     Args:
         flight: The flight.
@@ -39,7 +40,7 @@ def sorties_of(flight: Flight, uas: int) -> list[Sortie]:
     flying = np.flatnonzero(flight.mode[:, uas] < LANDED)
     if not len(flying):
         return []
-    landed = int(flying[-1]) + 1
+    landed = min(int(flying[-1]) + 1, len(flight.x) - 1)
     starts = [(0, 0), *_rests(flight, uas, landed)]
     ends = [rest[0] for rest in starts[1:]] + [landed]
     mine = [swap for swap in flight.swaps if swap.uas == flight.names[uas]]
@@ -55,7 +56,7 @@ def sorties_of(flight: Flight, uas: int) -> list[Sortie]:
     ]
 
 
-def _rests(flight: Flight, uas: int, landed: int) -> list[tuple[int, int]]:
+def _rests(flight: FlightRecord, uas: int, landed: int) -> list[tuple[int, int]]:
     """First and last sample of each time on the ground between two sorties."""
     drawn = flight.current_A[:landed, uas] > 0.0
     if not drawn.any():
@@ -66,7 +67,9 @@ def _rests(flight: Flight, uas: int, landed: int) -> list[tuple[int, int]]:
     return [(int(a) + 1, int(b)) for a, b in pairwise(active) if a >= began and b > a + 1]
 
 
-def _on_the_ground_s(flight: Flight, uas: int, landed: int, first: int, *, swapped: bool) -> float:
+def _on_the_ground_s(
+    flight: FlightRecord, uas: int, landed: int, first: int, *, swapped: bool
+) -> float:
     """How long a UAS was on the ground; climbs and descents are parts of files."""
     dt_s = flight.scenario.dt_s
     rest_s = (first - landed) * dt_s
