@@ -179,12 +179,15 @@ def registers_table(scenario: str) -> Table:
                 architecture = "sm_{}{}".format(*COMPUTE_CAPABILITY)
                 command = [ptxas, "-v", "-arch", architecture, "-o", os.devnull, str(file)]
                 said = subprocess.run(command, capture_output=True, text=True, check=True).stderr
-                spilled = sum(map(int, re.findall(r"(\d+) bytes spill stores", said)))
-                table.add_row(
-                    name, str(k), "UAS" if launch.of_uas else "mission",
-                    max(re.findall(r"Used (\d+) registers", said), key=int),
-                    max(re.findall(r"(\d+) bytes stack frame", said), key=int), str(spilled),
+                numbers = (
+                    [int(number) for number in re.findall(pattern, said)]
+                    for pattern in (
+                        r"Used (\d+) registers", r"(\d+) bytes stack", r"(\d+) bytes spill stores",
+                    )
                 )  # fmt: skip
+                used, local, spilled = numbers
+                cells = (k, "UAS" if launch.of_uas else "mission", max(used), max(local))
+                table.add_row(name, *map(str, cells), str(sum(spilled)))
     return table
 
 

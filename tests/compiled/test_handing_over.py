@@ -1,12 +1,16 @@
 """What kernels are handed in one array, and kernels that call others in turn."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
 
+from uas_coverage_env.compiled.digest import digest_of
 from uas_coverage_env.compiled.kernels import in_turn, kernel
+from uas_coverage_env.compiled.memory import Memory, record_dtype
 from uas_coverage_env.compiled.views import Handover
+from uas_coverage_env.env.batch import kernel as batch_kernel
+from uas_coverage_env.env.gpu import kernel as gpu_kernel
 
 SHAPE = (3, 4)
 
@@ -91,3 +95,40 @@ def test_kernels_are_called_in_turn_with_all_arguments():
     assert values[0] == (35 + 10) * 2 + 1
     in_turn((), "values, by")(values, 1.0)
     assert values[0] == 91
+
+
+def kernel_handed(dtype):
+    """A kernel of numbers alone, and what it is kept on disk by."""
+
+    class Records(NamedTuple):
+        records: Annotated[np.ndarray, dtype, 2]
+
+    taken = Handover(whole, Memory(Records)).take
+
+    @kernel
+    def read(numbers):
+        return taken(numbers)[2][0].k
+
+    return digest_of(read)
+
+
+def test_a_kernel_is_another_one_where_records_that_it_is_handed_are_others():
+    narrow = record_dtype([("x", "f8"), ("k", "i8")])
+    wide = record_dtype([("x", "f8"), ("more", "f8"), ("k", "i8")])
+    assert kernel_handed(narrow) == kernel_handed(narrow)
+    assert kernel_handed(narrow) != kernel_handed(wide)
+
+
+def records_in(given):
+    """Types of the records in a tuple of arrays and tuples."""
+    if isinstance(given, tuple):
+        return set().union(*map(records_in, given))
+    return {given.dtype} if isinstance(given, np.ndarray) and given.dtype.names else set()
+
+
+@pytest.mark.parametrize("handover", [batch_kernel.GIVEN, gpu_kernel.GIVEN])
+def test_all_records_that_steps_are_handed_are_declared(handover):
+    declared = {field.dtype for memory in handover.memories for field in memory.fields}
+    handed = records_in(handover._example())
+    assert len(handed) > 10
+    assert handed <= declared

@@ -1,5 +1,7 @@
 """Missions on a GPU, or its simulator, beside a batch of the same seeds."""
 
+from inspect import getclosurevars
+
 import numpy as np
 
 from uas_coverage_env.env import CoverageBatch
@@ -23,17 +25,35 @@ def briefs_of(flown):
     return [MissionBrief.of(flown.scenario_of(lane)) for lane in range(N_LANES)]
 
 
-def compare(scenario, asked, n_steps, **settings):
+def backwards(launch):
+    """A launch whose threads run one after the other, the last one first."""
+    part = getclosurevars(launch.kernel.fn).nonlocals["part"]
+
+    def threads(numbers, blocks):
+        for thread in reversed(range(blocks[0] * blocks[1])):
+            part(numbers, thread)
+
+    class Backwards:
+        def __getitem__(self, blocks):
+            return lambda numbers: threads(numbers, blocks)
+
+    return launch._replace(kernel=Backwards())
+
+
+def compare(scenario, asked, n_steps, last_first=False, **settings):
     """Fly both ways past the end of missions; lanes have seeds of their own.
 
     Args:
         scenario: The mission.
         asked: (U, size) the actions of every step; or those of all lanes, by its number.
         n_steps: How many.
+        last_first: In which order threads of the GPU run.
         **settings: Of both.
     """
     missions = CudaMissions(N_LANES, scenario, **settings)
     batch = CoverageBatch(N_LANES, scenario, **settings)
+    if last_first:
+        missions.launches = tuple(map(backwards, missions.launches))
     missions.reset(seed=SEED)
     batch.reset(SEED)
     not_equal = different(missions.state_dict(), batch.state_dict())
@@ -63,4 +83,6 @@ def compare(scenario, asked, n_steps, **settings):
         "returned": returned,
         "scenarios": scenarios,
         "observation": there["observation"].shape[-1],
+        # of which UAS guidance has written into the room
+        "guided": missions.rooms.path_m.any(axis=(1, 2)).tolist(),
     }

@@ -38,6 +38,19 @@ def compare_all():
     }
 
 
+def compare_orders():
+    """Threads in the other order: what UAS do at the same time must not depend on it."""
+    rng = np.random.default_rng(4)
+    crowd = GROUND.model_copy(update={"uas": practice_ground(n_uas=4).uas})
+    climbs = rng.choice((0, 1, 12, 13, 14), (N_STEPS, N_LANES, 4))
+    numbers = rng.uniform(-1.0, 1.0, (N_STEPS, N_LANES, 4, 3))
+    v1 = {"action": "waypoint", "version": V1}
+    return {
+        "numbers": compare(crowd, lambda k: numbers[k], N_STEPS, last_first=True),
+        "v1": compare(crowd, lambda k: climbs[k], N_STEPS, last_first=True, **v1),
+    }
+
+
 def compare_drawn():
     """Lanes draw from scenarios with fleets, obstacles and time limits of their own."""
     one = practice_ground(n_uas=1, max_steps=3)

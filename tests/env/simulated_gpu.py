@@ -85,6 +85,7 @@ if __name__ == "__main__":
         "scenes": scenes_on_gpu.compare_all(),
         "guided": guided_on_gpu.compare_all(),
         "drawn": guided_on_gpu.compare_drawn(),
+        "orders": guided_on_gpu.compare_orders(),
         "arrays": arrays_on_gpu.look_at_all(),
     }
     print(json.dumps({"missions": flown, **own}))

@@ -37,9 +37,17 @@ def test_what_goes_to_places_is_guided_on_a_simulated_gpu_as_in_a_batch(flown_on
     for name, result in guided.items():
         assert result["different"] == [], name
         assert result["restarts"] >= 2
+    # as each has a thread of its own, each has a room of its own
+    assert guided["places"]["guided"] == guided["with v1"]["guided"] == [True] * 4
     assert guided["with v1"]["observation"] != guided["places"]["observation"]
     for name in ("called home", "sent home"):
         assert guided[name]["returned"]
+
+
+def test_threads_of_a_simulated_gpu_come_to_the_same_in_any_order(flown_on_gpu):
+    for result in flown_on_gpu["orders"].values():
+        assert result["different"] == []
+        assert result["acted"] > 60
 
 
 def test_lanes_draw_their_missions_on_a_simulated_gpu_as_in_a_batch(flown_on_gpu):

@@ -254,14 +254,17 @@ class Handover:
 
     Args:
         example: Makes a tuple of the same types: of arrays, int64 and such tuples.
+        *memories: Declarations of its arrays. What they say of their types is in no signature of a
+            kernel that is handed numbers: it is kept on disk by them, see `digest`.
 
     Attributes:
+        memories: As given.
         take: In a kernel, (numbers) -> the tuple, its arrays views.
         take_first: Likewise, the first member of the tuple alone, which compiles faster.
     """
 
-    def __init__(self, example: Callable[[], Any]) -> None:
-        self._example = example
+    def __init__(self, example: Callable[[], Any], *memories: Memory) -> None:
+        self._example, self.memories = example, memories
         self._kept: dict[int, Any] = {}
         self.take = self._taking(lambda whole: whole)
         self.take_first = self._taking(lambda whole: whole[0])

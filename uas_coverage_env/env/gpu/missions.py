@@ -99,6 +99,7 @@ class CudaMissions:
         settings: How missions are flown and paid.
         launches: What a step launches, in turn.
         numbers: What each of them is launched with.
+        rooms: Of guidance, one for each UAS of each mission; none where there is no guidance.
 
     Raises:
         ValueError: An argument is none of what is allowed.
@@ -154,7 +155,7 @@ class CudaMissions:
             on_device(paying_of(told.reward, told.weights, told.reward)),
             on_device(observing_of(told.observation, told.observation)),
         )
-        self._rooms = on_device(new_rooms(pool.sizes, num_envs * n_uas if is_guided(pool) else 0))
+        self.rooms = on_device(new_rooms(pool.sizes, num_envs * n_uas if is_guided(pool) else 0))
         self.launches = step_with(pool)
         self.numbers: Any = self._handed_over()
         self._observing = observing_of(told.observation, version.observation)  # on the host
@@ -275,7 +276,7 @@ class CudaMissions:
 
     def _handed_over(self) -> Any:
         given = Given(
-            self._pool_there, self.missions, self._marks, *self._parts, self._rooms, self._rows
+            self._pool_there, self.missions, self._marks, *self._parts, self.rooms, self._rows
         )
         return on_device(GIVEN.numbers_of(given))
 
