@@ -381,3 +381,20 @@ def test_kernels_that_call_each_other_have_a_digest():
     there: dict[str, Any] = {"__name__": "somewhere"}
     exec("def a(x):\n    return b(x)\ndef b(x):\n    return a(x)", there)
     assert digest.digest_of(kernel(there["a"]))
+
+
+@pytest.mark.parametrize("first", ["a", "b", "c"])
+def test_where_kernels_call_each_other_an_edit_of_one_makes_all_of_them_others(first):
+    def digests(text: str) -> dict[str, str | None]:
+        there: dict[str, Any] = {"__name__": "somewhere"}
+        exec(text, there)
+        digest.digest_of(kernel(there[first]))  # what is described first is described from within
+        return {name: digest.digest_of(kernel(there[name])) for name in "abc"}
+
+    text = (
+        "def a(x):\n    return b(x) + 1.0\ndef b(x):\n    return c(x)\ndef c(x):\n    return a(x)"
+    )
+    before, after = digests(text), digests(text.replace("1.0", "2.0"))
+    assert before == digests(text)
+    assert None not in before.values()
+    assert all(before[name] != after[name] for name in "abc")

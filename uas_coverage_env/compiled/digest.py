@@ -7,6 +7,7 @@ one.
 
 import hashlib
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from enum import Enum
 from functools import cached_property, partial
@@ -29,6 +30,19 @@ _HERE = " at 0x"
 """In the text of what only one process knows, by its address."""
 
 _digests: WeakKeyDictionary[FunctionType, str] = WeakKeyDictionary()
+"""Of functions that name nothing around them: those that do have another within others."""
+
+_NOTHING = sys.maxsize
+_outermost = _NOTHING
+"""Place of the outermost value that was named from within it, in what is described now."""
+
+
+class Described(ABC):
+    """What says by itself what compiled code takes from it: its other attributes do not count."""
+
+    @abstractmethod
+    def described(self) -> str:
+        """A text, the same in each process."""
 
 
 def digest_of(kernel: Any) -> str | None:
@@ -46,12 +60,15 @@ def digest_of(kernel: Any) -> str | None:
 
 def _described(value: Any, within: tuple[Any, ...]) -> str:
     """A text of a value that is the same in each process; it lies within others, or is one."""
-    if any(value is other for other in within):
-        return "again"
+    for place, other in enumerate(within):
+        if value is other:
+            return _again(place, within)
     inside = (*within, value)
     kind = type(value)
     if isinstance(value, FunctionType):
         return _function(value, within)
+    if isinstance(value, Described):
+        return f"{kind.__qualname__} {value.described()}"
     if isinstance(value, ModuleType):
         return f"module {value.__name__}"
     if isinstance(value, type):
@@ -85,6 +102,13 @@ def _described(value: Any, within: tuple[Any, ...]) -> str:
     return f"{kind.__qualname__} {_described(said, inside)}"
 
 
+def _again(place: int, within: tuple[Any, ...]) -> str:
+    """A value that lies within itself is told by how far out it begins."""
+    global _outermost
+    _outermost = min(_outermost, place)
+    return f"again {len(within) - place}"
+
+
 def _of_a_library(value: Any) -> bool:
     return str(value.__module__).partition(".")[0] in _LIBRARIES
 
@@ -92,10 +116,16 @@ def _of_a_library(value: Any) -> bool:
 def _function(function: FunctionType, within: tuple[Any, ...]) -> str:
     if _of_a_library(function):
         return f"function {function.__module__}.{function.__qualname__}"
-    if function not in _digests:
+    digest = _digests.get(function)
+    if digest is None:
+        global _outermost
+        before, _outermost = _outermost, _NOTHING
         text = "\n".join(_lines(function, (*within, function)))
-        _digests[function] = _HERE if _HERE in text else hashlib.sha256(text.encode()).hexdigest()
-    return f"function {function.__qualname__} {_digests[function]}"
+        digest = _HERE if _HERE in text else hashlib.sha256(text.encode()).hexdigest()
+        if _outermost >= len(within):
+            _digests[function] = digest
+        _outermost = min(_outermost, before)
+    return f"function {function.__qualname__} {digest}"
 
 
 def _lines(function: FunctionType, within: tuple[Any, ...]) -> Iterator[str]:
@@ -123,6 +153,10 @@ def _named(there: dict[str, Any], names: set[str], within: tuple[Any, ...]) -> I
     for name in sorted(names & there.keys()):
         value = there[name]
         yield f"{name} {_described(value, within)}"
-        ours = isinstance(value, ModuleType) and value.__name__.partition(".")[0] not in _LIBRARIES
-        if ours and not any(value is other for other in within):
+        if not isinstance(value, ModuleType) or value.__name__.partition(".")[0] in _LIBRARIES:
+            continue
+        place = next((k for k, other in enumerate(within) if other is value), None)
+        if place is None:
             yield from _named(vars(value), names, (*within, value))
+        else:
+            yield _again(place, within)

@@ -17,6 +17,7 @@ from numba import from_dtype, typeof, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from uas_coverage_env.compiled.digest import Described
 from uas_coverage_env.compiled.internals import array_at, parts_of
 from uas_coverage_env.compiled.kernels import COMPILED, inlined_kernel
 from uas_coverage_env.compiled.memory import Field, Memory, Pool, T
@@ -249,22 +250,19 @@ def copy_arrays(source: Any, target: Any) -> None:
 copy_arrays = _in_kernels(_copied, copy_arrays)
 
 
-class Handover:
+class Handover(Described):
     """How kernels get many arrays in one array of numbers: to hand over each takes longer.
 
     Args:
         example: Makes a tuple of the same types: of arrays, int64 and such tuples.
-        *memories: Declarations of its arrays. What they say of their types is in no signature of a
-            kernel that is handed numbers: it is kept on disk by them, see `digest`.
 
     Attributes:
-        memories: As given.
         take: In a kernel, (numbers) -> the tuple, its arrays views.
         take_first: Likewise, the first member of the tuple alone, which compiles faster.
     """
 
-    def __init__(self, example: Callable[[], Any], *memories: Memory) -> None:
-        self._example, self.memories = example, memories
+    def __init__(self, example: Callable[[], Any]) -> None:
+        self._example = example
         self._kept: dict[int, Any] = {}
         self.take = self._taking(lambda whole: whole)
         self.take_first = self._taking(lambda whole: whole[0])
@@ -272,6 +270,10 @@ class Handover:
     @cached_property
     def _type(self) -> Any:
         return typeof(self._example())
+
+    def described(self) -> str:
+        """The types: no signature of a kernel that is handed numbers has them."""
+        return str(self._type)
 
     def numbers_of(self, value: Any) -> NDArray[np.int64]:
         """What `take` makes the tuple of; its arrays have to stay where they are.

@@ -18,12 +18,10 @@ from uas_coverage_env.compiled.kernels import (
 )
 from uas_coverage_env.compiled.memory import Pool
 from uas_coverage_env.compiled.views import Handover, lane_view, rows_view
-from uas_coverage_env.entities.state import STATE, WorldState, as_observed
+from uas_coverage_env.entities.state import WorldState, as_observed
 from uas_coverage_env.env.batch.lane import finish_lane_with, keep_lane_with
 from uas_coverage_env.env.batch.memory import (
-    FINAL,
     FLY,
-    LANES,
     UAS_AT_ONCE,
     Missions,
     new_missions,
@@ -35,17 +33,7 @@ from uas_coverage_env.env.batch.pool import (
     tables_at,
 )
 from uas_coverage_env.env.episode.act import acting_of, first_not_finite
-from uas_coverage_env.env.episode.memory import (
-    ACTING,
-    FIRST_OBSERVATION,
-    LEARNERS,
-    OBSERVING,
-    PAYING,
-    SCRATCH,
-    TABLES,
-    Learners,
-    Scratch,
-)
+from uas_coverage_env.env.episode.memory import SCRATCH, Learners, Scratch
 from uas_coverage_env.env.episode.observe import observing_of
 from uas_coverage_env.env.episode.pay import paying_of
 from uas_coverage_env.env.episode.step import ACCEPTED, Rules, stages_with
@@ -107,10 +95,7 @@ def _example() -> Given:
     return Given.of(pool.arrays, new_missions(pool.sizes, 1, 1), rules)
 
 
-GIVEN = Handover(
-    _example, ARENA, STATE, TABLES, LEARNERS, FIRST_OBSERVATION, LANES, FINAL, SCRATCH, ACTING,
-    PAYING, OBSERVING,
-)  # fmt: skip
+GIVEN = Handover(_example)
 """How kernels are given it."""
 
 _take, _take_flight = GIVEN.take, GIVEN.take_first

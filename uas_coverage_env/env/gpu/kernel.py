@@ -23,7 +23,6 @@ from uas_coverage_env.compiled.kernels import in_turn, inlined_kernel, kernel
 from uas_coverage_env.compiled.memory import Memory
 from uas_coverage_env.compiled.views import Handover, lane_view, rows_view
 from uas_coverage_env.entities.state import FLYING, as_observed
-from uas_coverage_env.env.batch import kernel as batch_kernel
 from uas_coverage_env.env.batch.kernel import scratch_of
 from uas_coverage_env.env.batch.lane import finish_lane_with, keep_lane_with
 from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP, MissionPool, Missions, new_missions
@@ -90,7 +89,7 @@ def new_rooms(sizes: Mapping[str, int], n: int) -> Room:
 
 _room_of = lane_view(ROOM, sized_by=ARENA)
 
-GIVEN = Handover(_example, *batch_kernel.GIVEN.memories, MARKS, ROOM)
+GIVEN = Handover(_example)
 """How kernels are given it: numba takes a millisecond to hand over a hundred arrays."""
 
 _take = GIVEN.take
