@@ -115,7 +115,7 @@ def test_a_missing_file_is_named(tmp_path):
         (
             'vehicle = "s500_v2"',
             'vehicle = "s501"',
-            "uas[0].vehicle: unknown vehicle 's501'; take crazyflie, hexacopter, s500_v2 or the path of",
+            "uas[0].vehicle: unknown vehicle 's501'; take crazyflie, hexacopter, s500_v2 or",
         ),
         ('vehicle = "s500_v2"', 'vehicle = "own.toml"', "uas[0].vehicle: no vehicle file at /"),
         (
