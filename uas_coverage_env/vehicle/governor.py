@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
 
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.linear import rigid_body, taylor
@@ -31,10 +32,17 @@ N_ROW_COLUMNS = BOUND + 1
 
 _TORQUE_COST = 30.0  # settles 12 m/s in about 7 s, near the time optimum
 _QUICK_S = 4.4  # the shipped vehicles lean over and stop from full speed in hardly more at best
+_STEPS_S = 0.5  # of a scale for each second of a step
 _REFERENCE_SHARE = 0.999  # of the speed limit: a bound that is only approached is certified
 _SETTLED_S = 10.0
 _LONGEST_S = 60.0
 _IMPLIED = 1.0 - 1e-6  # the linear programs are exact to 1e-7
+_FINE_S = 0.1
+"""Shorter steps make rows that hardly differ from their neighbours: of these, a few are kept, with
+bounds that are narrower by `_NARROWER`, which imply the others as they are. What these allow alone
+may still be used a little, so `_SPARE` of each limit is left [s]."""
+
+_NARROWER, _SPARE = 2e-3, 1e-2
 
 
 class VelocityLoop(NamedTuple):
@@ -65,17 +73,23 @@ def horizontal_axis(vehicle: VehicleParams, dt_s: float) -> tuple[FloatArray, Fl
     return axis_A, -B[chain, S.TAU_Y] * forward * vehicle.airframe.inertia_kgm2[1]
 
 
-def time_scale(vehicle: VehicleParams) -> float:
-    """By what the times of the velocity loop, and of guidance, are multiplied: at most 1.
+def time_scale(vehicle: VehicleParams, dt_s: float) -> float:
+    """By what the times of the velocity loop, where it is below 1, and of guidance are multiplied.
 
     1 for vehicles that take as long to stop as the shipped ones, or longer: the loop is as quick
     for a small step, and the governor holds it back. One that could stop in a fourth of the time
-    has half of it: tilt follows its own loop, and the next sample comes no sooner.
+    has half of it, since tilt follows its own loop. And no less than half a step: a velocity is
+    held that long, and what is steered more quickly swings.
+
+    Args:
+        vehicle: Parameters.
+        dt_s: Length of a step [s].
     """
     limits = vehicle.limits
     most_mps2 = vehicle.airframe.gravity_mps2 * math.tan(limits.tilt_max_rad)
     leaning_s = 2.0 * math.sqrt(limits.tilt_max_rad / limits.angular_acceleration_xy_max_radps2)
-    return min(math.sqrt((limits.v_xy_max_mps / most_mps2 + leaning_s) / _QUICK_S), 1.0)
+    quickness = math.sqrt((limits.v_xy_max_mps / most_mps2 + leaning_s) / _QUICK_S)
+    return max(min(quickness, 1.0), _STEPS_S * dt_s)
 
 
 @lru_cache(maxsize=64)
@@ -93,15 +107,19 @@ def design_velocity_loop(vehicle: VehicleParams, dt_s: float) -> VelocityLoop:
     axis_A, axis_B = horizontal_axis(vehicle, dt_s)
     A, B = axis_A[1:, 1:], axis_B[1:, None]
     # three integrators in a row: times go with the sixth root
-    quickness = time_scale(vehicle)
+    quickness = min(time_scale(vehicle, dt_s), 1.0)
     cost = _TORQUE_COST * quickness**6
     P = solve_discrete_are(A, B, np.diag([1.0, 0.0, 0.0]), np.array([[cost]]))
     gain = np.linalg.solve(cost + B.T @ P @ B, B.T @ P @ A)[0]
-    reference_max_mps = _REFERENCE_SHARE * vehicle.limits.v_xy_max_mps
+    fine = dt_s < _FINE_S
+    usable = 1.0 - _SPARE if fine else 1.0
+    reference_max_mps = _REFERENCE_SHARE * usable * vehicle.limits.v_xy_max_mps
     held = np.array([0.0, 0.0, 0.0, 1.0, reference_max_mps])
     steps = int(np.ceil(quickness * _SETTLED_S / dt_s))
     while True:
         rows, following = _predicted(vehicle, A - B @ gain[None], gain, steps)
+        rows[:, BOUND] *= usable
+        following[:, BOUND] *= usable
         known = np.vstack([rows, held])
         if all(_is_implied(row, known) for row in following):
             break
@@ -111,6 +129,9 @@ def design_velocity_loop(vehicle: VehicleParams, dt_s: float) -> VelocityLoop:
                 f"limits of {vehicle.name!r} cannot be kept at dt_s {dt_s}; "
                 "raise limits.tilt_max_rad or lower limits.v_xy_max_mps"
             )
+    if fine:
+        rows = _outermost(rows)
+        return VelocityLoop(gain, _without_implied(rows, held, _NARROWER), reference_max_mps)
     return VelocityLoop(gain, _without_implied(rows, held), reference_max_mps)
 
 
@@ -154,11 +175,20 @@ def _is_implied(row: FloatArray, known: FloatArray) -> bool:
     return result.status == 0 and -result.fun <= _IMPLIED
 
 
-def _without_implied(rows: FloatArray, held: FloatArray) -> FloatArray:
-    """The rows less those that the others imply; late steps go first."""
-    kept = list(range(len(rows)))
+def _outermost(rows: FloatArray) -> FloatArray:
+    """The rows that no others imply, by the corners of what they span: quicker for thousands."""
+    scaled = rows[:, :BOUND] / rows[:, BOUND:]
+    corners = ConvexHull(np.vstack([scaled, -scaled])).vertices
+    return rows[np.unique(corners % len(rows))]
+
+
+def _without_implied(rows: FloatArray, held: FloatArray, narrower: float = 0.0) -> FloatArray:
+    """The rows less those that the others imply, with narrower bounds; late steps go first."""
+    kept, full = list(range(len(rows))), rows
+    rows = rows.copy()
+    rows[:, BOUND] *= 1.0 - narrower
     for index in reversed(range(len(rows))):
         others = [k for k in kept if k != index]
-        if _is_implied(rows[index], np.vstack([rows[others], held])):
+        if _is_implied(full[index], np.vstack([rows[others], held])):
             kept = others
     return rows[kept]
