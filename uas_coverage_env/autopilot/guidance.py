@@ -14,6 +14,7 @@ from uas_coverage_env.autopilot.exit_overhang import LEG_TO_TARGET, TARGET_IS_PL
 from uas_coverage_env.autopilot.lookahead import fixed_slack, fly_and_brake
 from uas_coverage_env.autopilot.low_altitude_return import low_way
 from uas_coverage_env.autopilot.room import new_room
+from uas_coverage_env.autopilot.wishes import IN_PLACE, LEVEL, STRAIGHT_ON, TRIES
 from uas_coverage_env.compiled.kernels import (
     allocating_kernel,
     inlined_kernel,
@@ -78,26 +79,6 @@ _WIND_TO_HURRY = 0.5
 than simulated. There, as in still air, a UAS comes home slowly [-]. Without it, 2 of 151 UAS were
 blown over the fence (docs/wind_and_models.md)."""
 
-_AS_WISHED, _LEVEL, _IN_PLACE, _STRAIGHT_ON = range(4)
-
-
-def _tries() -> np.ndarray:
-    """(T, 3) what is flown of a wish, the first that leaves room to brake: see `_write_safe`.
-
-    Factors by which its velocity is shortened and turned (along and to the right of it), and the
-    height: slower and without descending, up or down in place, straight on without climbing, to one
-    side. Speeds are shares of the wish, turns are in radians.
-    """
-    shares, when_turned = (1.0, 0.7, 0.4, 0.15), 0.4
-    turns_rad = (0.9, -0.9, 1.8, -1.8, 2.7, -2.7)
-    rows = [(share, 0.0, height) for share in shares for height in (_AS_WISHED, _LEVEL)]
-    rows += [(0.0, 0.0, _IN_PLACE), *((share, 0.0, _STRAIGHT_ON) for share in shares)]
-    for turn_rad in turns_rad:
-        rows.append((when_turned * math.cos(turn_rad), when_turned * math.sin(turn_rad), _LEVEL))
-    return np.array(rows)
-
-
-_TRIES = _tries()
 _NOWHERE_M = 1e-9  # nearer than this there is no direction [m]
 
 
@@ -308,17 +289,17 @@ def _brake(arena, i, x, reference, nonlinear, path_m, belief):
 def _write_safe(
     arena, i, x, reference, north_mps, east_mps, altitude_m, leg, nonlinear, command, path_m, belief
 ):
-    """Write the wish, a velocity and an altitude, or the first of `_TRIES` that leaves room."""
+    """Write the wish, a velocity and an altitude, or the first of `TRIES` that leaves room."""
     headroom_m = arena.rules[0].length_scale * HEADROOM_M
-    for k in range(_TRIES.shape[0]):
-        along, aside, height = _TRIES[k]
+    for k in range(TRIES.shape[0]):
+        along, aside, height = TRIES[k]
         wanted_m = altitude_m
-        if height == _LEVEL:
+        if height == LEVEL:
             # what is in the way of a descent is not in the way of staying up
             wanted_m = max(altitude_m, -x[S.Z] - x[S.VZ])
-        elif height == _IN_PLACE and abs(altitude_m + x[S.Z]) <= headroom_m:
+        elif height == IN_PLACE and abs(altitude_m + x[S.Z]) <= headroom_m:
             continue
-        elif height == _STRAIGHT_ON:
+        elif height == STRAIGHT_ON:
             if leg != CLEAR or not arena.rules[0].overhangs:
                 continue
             # what is in the way of a climb is not in the way of the straight line
