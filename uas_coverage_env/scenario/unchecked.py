@@ -90,7 +90,8 @@ class UncheckedScenario(_Tables):
         # files, and what is computed from their content, are those of scenarios before the field
         data = serialise(self)
         for name, field in type(self).model_fields.items():
-            if name not in _ALWAYS and not field.is_required() and data.get(name) == field.default:
+            usual = not field.is_required() and getattr(self, name) == field.default
+            if usual and name not in _ALWAYS:
                 data.pop(name, None)
         return data
 
