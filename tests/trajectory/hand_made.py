@@ -42,7 +42,7 @@ def moving(*bodies, dt_s=1.0):
     n = len(bodies)
     places, velocities = (np.array(rows, float) for rows in zip(*bodies, strict=True))
     return MovingObstacles(
-        places, velocities, np.full(n, 4.0), np.full(n, 3.0), np.full(n, 3.0), dt_s, n
+        places, velocities, np.full(n, 4.0), np.full(n, 3.0), np.full(n, 3.0), dt_s, n, 0.0
     )
 
 

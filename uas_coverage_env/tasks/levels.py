@@ -94,6 +94,8 @@ LEVELS: Mapping[str, Task] = {
             families=_families("air-taxi", n_uas=(2, 3), n_waypoints=(4, 8)),
             return_mode=True,
             safety_filter=True,
+            # of some 20 kWh each
+            reward_weights={"energy": 2e-5},
         ),
     )
 }  # fmt: skip

@@ -67,7 +67,7 @@ def _share_in_reach(arena, state, tables):
 def _is_in_reach(arena, state, tables, w):
     for i in range(state.uas.shape[0]):
         uas = arena.uas[i]
-        start_m = uas.home_m
+        start_m = uas.start_m
         charge_s = (uas.dod_max - tables.scales[i].start_dod) / uas.dod_per_s
         if can_cover(arena, i, w):
             _, there_s = seconds_there(arena, i, w, start_m[0], start_m[1], start_m[2])

@@ -124,7 +124,7 @@ def _grown_to_waypoint(arena, state, tables, learners, scratch, i, parameters):
     """Growth of the potential of the nearest waypoint."""
     before = learners.potentials[i, TO_WAYPOINT]
     if _begins(state):
-        start_m = arena.uas[i].home_m
+        start_m = arena.uas[i].start_m
         before = _towards_waypoint(
             arena, state.uncovered, True, i, start_m[0], start_m[1], start_m[2],
             tables.scales[i].start_dod, 0,
@@ -143,7 +143,7 @@ def _grown_to_home(arena, state, tables, learners, scratch, i, parameters):
     """Growth of the potential of the way home."""
     before = learners.potentials[i, TO_HOME]
     if _begins(state):
-        start_m = arena.uas[i].home_m
+        start_m = arena.uas[i].start_m
         before = _towards_home(
             arena, state.uncovered, True, i, start_m[0], start_m[1], start_m[2], 0.0,
             tables.scales[i].start_dod, 0,

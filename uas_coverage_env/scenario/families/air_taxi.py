@@ -155,7 +155,7 @@ def _mission(
         "moving_obstacles": tuple(_helicopters(rng, pads_m)),
         "uas": tuple(
             Uas(
-                name=f"taxi_{u + 1}",
+                name=f"uas_{u + 1}",
                 vehicle="air_taxi",
                 start_m=(*start_m.tolist(), -_PAD_M),
                 land_m=(*home_m.tolist(), -_PAD_M),
