@@ -35,7 +35,7 @@ def mistake_in(tmp_path, text):
 
 
 def test_the_shipped_scenarios_load_by_name_and_give_no_warning():
-    known = ("corridor", "gasche2025", "karhula", "mixed_fleet", "open_field", "village")
+    known = ("corridor", "gasche2025", "indoor", "karhula", "mixed_fleet", "open_field", "village")
     assert scenario_names() == known
     for name in scenario_names():
         scenario = load_scenario(name)

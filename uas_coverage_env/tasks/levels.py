@@ -88,9 +88,17 @@ LEVELS: Mapping[str, Task] = {
             disturbances="moderate",
             faults=faults,
         ),
+        Task(
+            level="indoor",
+            meaning="two or three small UAS at one height in rooms along a corridor, in which a "
+            "person walks",
+            families=_families("indoor", n_uas=(2, 3), n_waypoints=(8, 14)),
+            return_mode=True,
+            safety_filter=True,
+        ),
     )
 }  # fmt: skip
-"""Name -> level, from easy to hard, in the first version of the environments."""
+"""Name -> level, from easy to hard and then indoors, in the first version of the environments."""
 
 
 @cache
