@@ -24,6 +24,15 @@ def test_a_check_names_all_waypoints_without_a_way_to_them_and_says_what_closes_
     assert said.err.count("\n") == 1
 
 
+def test_a_check_names_gaps_that_are_too_narrow_for_routes(elsewhere, capsys):
+    yard(ring(gap_m=5.0)).to_file(elsewhere / "yard.toml")
+    assert main(["scenario", "check", "yard.toml"]) == 0
+    err = capsys.readouterr().err
+    assert re.search(r"Too narrow: 5 m between zone_\w+ and zone_\w+ of 6\.72 m needed", err)
+    assert "route_margin_m" in err
+    assert err.count("\n") == 1
+
+
 def test_of_many_waypoints_without_a_way_each_is_named(elsewhere, capsys):
     inside = [waypoint((115.0 + 6.0 * k, 130.0, -10.0), 2.0) for k in range(6)]
     places = [waypoint(OPEN[0]), *inside]

@@ -41,6 +41,26 @@ def test_a_gap_is_a_way_from_twice_the_distance_of_routes_on(gap_m, is_open):
     assert bool(access(yard(ring(gap_m=gap_m))).has_way[0, 1]) is is_open
 
 
+def test_gaps_that_a_uas_fits_through_but_routes_do_not_are_named():
+    narrow = access(yard(ring(gap_m=OPEN_GAP_M - 0.5))).narrow_gaps
+    assert [gap.width_m for gap in narrow] == pytest.approx([OPEN_GAP_M - 0.5])
+    assert [gap.needed_m for gap in narrow] == pytest.approx([OPEN_GAP_M])
+    assert all(name.startswith("zone_") for name in narrow[0].between)
+    assert not access(yard(ring(gap_m=OPEN_GAP_M + 0.5))).narrow_gaps
+    # walls that touch, and a slit that no UAS fits through, are no gaps
+    assert not access(yard()).narrow_gaps
+    assert not access(yard(ring(gap_m=0.7))).narrow_gaps
+    # what can be flown over closes nothing
+    assert not access(yard(ring(20.0, gap_m=5.0))).narrow_gaps
+
+
+def test_a_smaller_margin_of_routes_opens_a_gap():
+    scenario = yard(ring(gap_m=OPEN_GAP_M - 0.5))
+    made = access(scenario.model_copy(update={"route_margin_m": 0.3}))
+    assert made.has_way.all()
+    assert not made.narrow_gaps
+
+
 def test_a_sphere_that_reaches_out_of_the_ring_can_be_covered_from_outside():
     assert not access(yard(radius_m=20.0)).has_way[0, 1]
     assert access(yard(radius_m=40.0)).has_way[0, 1]

@@ -78,8 +78,8 @@ def test_a_missing_file_is_named(tmp_path):
         ("schema = 1\n", "", "schema: is missing"),
         ("schema = 1", "schema = 2", "schema: should be less than or equal to 1, not 2"),
         ("schema = 1", "schema_version = 1", "schema_version: unknown key"),
-        ("dt_s = 1.0", "dt_s = 0", "dt_s: should be greater than or equal to 0.1, not 0"),
-        ("dt_s = 1.0", "dt_s = 2.5", "dt_s: should be less than or equal to 2, not 2.5"),
+        ("dt_s = 1.0", "dt_s = 0", "dt_s: should be greater than or equal to 0.02, not 0"),
+        ("dt_s = 1.0", "dt_s = 12.5", "dt_s: should be less than or equal to 10, not 12.5"),
         ("dt_s = 1.0", "dt_s = nan", "dt_s: should be a finite number, not nan"),
         ("dt_s = 1.0", 'dt_s = "1"', 'dt_s: should be a number, not "1"'),
         ("dt_s = 1.0", "dt_s = true", "dt_s: should be a number, not true"),
@@ -115,7 +115,7 @@ def test_a_missing_file_is_named(tmp_path):
         (
             'vehicle = "s500_v2"',
             'vehicle = "s501"',
-            "uas[0].vehicle: unknown vehicle 's501'; take hexacopter, s500_v2 or the path of",
+            "uas[0].vehicle: unknown vehicle 's501'; take crazyflie, hexacopter, s500_v2 or",
         ),
         ('vehicle = "s500_v2"', 'vehicle = "own.toml"', "uas[0].vehicle: no vehicle file at /"),
         (

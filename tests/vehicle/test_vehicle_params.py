@@ -178,7 +178,7 @@ def test_the_return_threshold_leaves_the_way_home(name, threshold):
     assert return_threshold(vehicle, lower) == pytest.approx(return_threshold(vehicle) - 0.1)
 
 
-@pytest.mark.parametrize("dt_s", [0.0, -1.0, float("nan"), float("inf"), 0.01, 2.5])
+@pytest.mark.parametrize("dt_s", [0.0, -1.0, float("nan"), float("inf"), 0.01, 10.5])
 def test_a_sampling_time_out_of_range_is_refused(dt_s):
     with pytest.raises(ValueError, match="dt_s is"):
         compile_vehicle(load_vehicle("s500_v2"), dt_s)

@@ -168,8 +168,22 @@ def _closed_off(scenario: Scenario, access: Access) -> Iterator[str]:
             f"{len(closed)} of {len(scenario.waypoints)} waypoints have no way to them: "
             f"{_named(list(closed), _NAMED_IN_WARNINGS)}; {_first(list(closed.values()))}. Routes "
             f"keep {route_margin_m(scenario):.2g} m more than the safe distances: widen the "
-            f"gaps, or move or take away what is closed off"
+            f"gaps, or move or take away what is closed off{_too_narrow(access)}"
         )
+
+
+def _too_narrow(access: Access) -> str:
+    """Which doors and gaps UAS fit through, but routes do not; nothing where there is none."""
+    gaps = access.narrow_gaps
+    if not gaps:
+        return ""
+    named = [
+        f"{gap.width_m:.3g} m between {gap.between[0]} and {gap.between[1]} of "
+        f"{gap.needed_m:.3g} m needed"
+        for gap in gaps[:_NAMED]
+    ]
+    more = f" and {len(gaps) - _NAMED} more" if len(gaps) > _NAMED else ""
+    return f". Too narrow: {', '.join(named)}{more}; a smaller route_margin_m needs less"
 
 
 def _far(scenario: Scenario, access: Access) -> Iterator[str]:

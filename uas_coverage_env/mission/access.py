@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,20 @@ BoolArray = NDArray[np.bool_]
 _TRIED = 8
 """Obstacles, the nearest to a waypoint, of which each is taken away to see whether it opens."""
 _NAMED = 3
+
+
+class Gap(NamedTuple):
+    """A door or gap between two obstacles that is too narrow for routes.
+
+    Attributes:
+        between: Their names.
+        width_m: Of the gap [m].
+        needed_m: What routes need: what they keep on either side [m].
+    """
+
+    between: tuple[str, str]
+    width_m: float
+    needed_m: float
 
 
 class Access:
@@ -65,6 +81,28 @@ class Access:
             if self._opens(o, uas, waypoint):
                 return (self._obstacles[o].name,)
         return tuple(self._obstacles[o].name for o in met)
+
+    @cached_property
+    def narrow_gaps(self) -> tuple[Gap, ...]:
+        """Doors and gaps that a UAS fits through, but its routes do not; the narrowest first."""
+        arena = build_arena(self._brief.as_scenario())
+        tall = np.flatnonzero(arena.obstacles["roof_m"] > arena.rules["ceiling_m"][0])
+        kept_m, least_m = arena.obstacles["wall_m"], 2.0 * float(arena.uas["radius_m"].max())
+        found = []
+        for a, b in combinations(tall.tolist(), 2):
+            needed_m, width_m = float(kept_m[a] + kept_m[b]), self._apart_m(a, b)
+            if least_m < width_m < needed_m:
+                names = self._obstacles[a].name, self._obstacles[b].name
+                found.append(Gap(names, width_m, needed_m))
+        return tuple(sorted(found, key=lambda gap: gap.width_m))
+
+    def _apart_m(self, a: int, b: int) -> float:
+        """How far two obstacles are apart, by the face of either that separates them the most."""
+        one, other = self._brief.hulls[a], self._brief.hulls[b]
+        return max(
+            float(one.face_distances(other.vertices_m).min(axis=0).max()),
+            float(other.face_distances(one.vertices_m).min(axis=0).max()),
+        )
 
     def _leads_home(self, arena: Arena, uas: int, places_m: FloatArray) -> BoolArray:
         """(W,) whether there is a way to waypoints at these places, or to their spheres."""

@@ -69,7 +69,7 @@ class UncheckedScenario(_Tables):
 
     schema_version: int = Field(alias="schema", ge=1, le=1)
     name: Name
-    dt_s: Annotated[float, Field(ge=0.1, le=2.0)]
+    dt_s: Annotated[float, Field(ge=0.02, le=10.0)]
     max_steps: Annotated[int, Field(ge=1, le=100_000)]
     landing_distance_m: Length_m
     landing_speed_mps: Annotated[float, Field(gt=0.0, le=100.0)]

@@ -244,7 +244,7 @@ def simulate_battery(
         vehicle: parameters.
         current_A: (T,) [A] held over each step, positive when discharging.
         soc_0: state of charge at the start, in [0, 1]; the polarisation starts at 0.
-        dt_s: [s] in (0, 2].
+        dt_s: [s] in (0, 10].
 
     Returns:
         soc (T,) and voltage_V (T,): sample k is the state before the current of step k acts, and
@@ -290,10 +290,10 @@ def check_step(dt_s: float) -> None:
     """Refuse a step for which the discrete model does not hold.
 
     Raises:
-        ValueError: dt_s outside (0, 2].
+        ValueError: dt_s outside (0, 10].
     """
-    if not is_number(dt_s) or not 0.0 < dt_s <= 2.0:
-        raise ValueError(f"dt_s is {dt_s!r}; give a step in (0, 2] seconds")
+    if not is_number(dt_s) or not 0.0 < dt_s <= 10.0:
+        raise ValueError(f"dt_s is {dt_s!r}; give a step in (0, 10] seconds")
 
 
 def check_vehicle(vehicle: object) -> None:

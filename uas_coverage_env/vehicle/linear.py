@@ -86,7 +86,7 @@ def linear_model(
     Args:
         vehicle: parameters.
         dod: depth of discharge in [0, 1] that selects the segment of the discharge curve.
-        dt_s: [s] sampling time in (0, 2].
+        dt_s: [s] sampling time in (0, 10].
         order: N_dis, from 2 to 50; 4 is the lowest in which a torque moves the position at once.
 
     Returns:

@@ -38,7 +38,7 @@ COUNTS = {
 }
 """How many rows of a record are in use, and how few and many these may be."""
 
-_DT_MIN_S = 0.1  # so that MAX_GOVERNOR_ROWS suffice
+_DT_MIN_S = 0.02  # so that MAX_GOVERNOR_ROWS suffice
 
 _f8, _i8 = "f8", "i8"
 _PARTS = (parts.Airframe, parts.Rotor, parts.Motor, parts.Esc, parts.ThrustCorrection, parts.Limits)
@@ -99,7 +99,7 @@ def compile_vehicle(vehicle: VehicleParams, dt_s: float) -> NDArray[np.void]:
 
     Args:
         vehicle: parameters.
-        dt_s: [s] sampling time in [0.1, 2].
+        dt_s: [s] sampling time in [0.02, 10].
 
     Returns:
         Array of shape () and type VEHICLE_DTYPE; kernels take its element, `record[()]`.

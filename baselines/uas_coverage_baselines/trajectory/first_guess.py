@@ -18,6 +18,9 @@ IntArray = NDArray[np.int64]
 
 _CRUISE = 0.75  # share of the largest speed
 _SLOWER = (1.0, 0.85, 0.7, 0.5)
+_SLOWEST = (
+    0.35  # share of that, at last: along a facade, where visits follow each other up and down
+)
 _WAITS_S = (6.0, 12.0, 20.0)
 _CLIMB, _DESCENT = 0.83, 0.87
 _SET_OFF_S, _SETTLE_S = 3.0, 4.0
@@ -27,6 +30,7 @@ _BESIDE_M = 0.5
 _STOPPING_S = 2.5
 _DEEPER_M = 0.5  # at scale 1
 _MENDS = 3
+_MOST_MISSED = 20  # visits; where more are missed, moving them one by one mends nothing
 
 
 class Guess(NamedTuple):
@@ -58,7 +62,7 @@ def first_flight(
     tries = [(slower, 0.0, False) for slower in _SLOWER]
     if np.abs(start[VELOCITY]).max() > 0.5:
         tries += [(_SLOWER[1], wait_s, False) for wait_s in _WAITS_S]
-    tries += [(slower, 0.0, True) for slower in _SLOWER]
+    tries += [(slower, 0.0, True) for slower in (*_SLOWER, _SLOWEST)]
     for slower, wait_s, dips in tries:
         speeds = Speeds(
             _CRUISE * slower * float(limits.norms[0]),
@@ -87,9 +91,10 @@ def _mended(
 ) -> Work[PlannedFlight]:
     """Visits moved where they are missed, until nothing is violated or nothing helps."""
     for _ in range(_MENDS):
-        if flight.is_clear:
+        missed = np.flatnonzero(flight.missed_m > 0.02)
+        if flight.is_clear or len(missed) > _MOST_MISSED:
             return flight
-        for k in np.flatnonzero(flight.missed_m > 0.02):
+        for k in missed:
             for by in (1, 2, -1):
                 visits = flight.visits.copy()
                 visits[k] = min(max(visits[k] + by, 1), flight.steps - 1)
