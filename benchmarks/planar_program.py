@@ -57,7 +57,8 @@ def main(
         table.add_row(
             figure, *(f"{np.median(c):.3g} ({c.min():.3g} to {c.max():.3g})" for c in columns)
         )
-    table.add_row("sum of processor_s", *(f"{s:.3g}" for s in np.array(rows)[..., 3].sum(axis=0)))
+    seconds = np.array(rows)[..., FIGURES.index("processor_s")].sum(axis=0)
+    table.add_row("sum of processor_s", *(f"{s:.3g}" for s in seconds))
     Console(width=120).print(table)
 
 

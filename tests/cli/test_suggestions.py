@@ -52,8 +52,8 @@ def test_a_name_that_is_like_none_is_answered_with_them_all(capsys):
     assert main(["run", "atlantis"]) == 2
     err = capsys.readouterr().err
     assert (
-        "take corridor, gasche2025, indoor, karhula, mixed_fleet, open_field, village, courtyards:SEED"
-        in err
+        "take corridor, gasche2025, indoor, karhula, mixed_fleet, open_field, village, "
+        "courtyards:SEED" in err
     )
     assert did_you_mean("", ["village"], "take village") == "take village"
     assert did_you_mean("a3c", ["ppo", "sac"], "take ppo or sac") == "take ppo or sac"
