@@ -48,6 +48,7 @@ def _of(kind: ActionKind, kept: slice, write: Any, express: Any = None) -> Actio
     """A kind with some of its numbers, which its kernel takes."""
     own_ranges, own_express = kind.ranges, express or kind.express
     assert own_ranges is not None
+    assert own_express is not None
 
     def ranges(vehicle: VehicleParams, scenario: Scenario) -> Sequence[Range]:
         return own_ranges(vehicle, scenario)[kept]
