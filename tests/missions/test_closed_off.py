@@ -40,6 +40,14 @@ def test_trajectory_flies_the_rest_at_once_wherever_the_closed_one_stands_in_the
     assert [one.waypoint for one in flight.left_open] == [first]
 
 
+def test_tour_leaves_out_what_is_closed_off_before_it_takes_off():
+    planner = load_planner("tour", PLANNERS["tour"])
+    flight = rollout(yard(), planner)
+    assert (flight.covered[-1], flight.mode[-1].tolist()) == (2, [3])
+    assert flight.steps < 50
+    assert planner.given_up == {1: "no way to it"}
+
+
 def test_trajectory_leaves_what_is_closed_off_to_a_uas_that_has_a_way():
     starts = (HOME, (INSIDE[0] + 8.0, INSIDE[1], -1.0))
     places = [waypoint(OPEN[0], 8.0), waypoint(INSIDE, 5.0)]

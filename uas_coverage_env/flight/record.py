@@ -149,7 +149,7 @@ class Why(StrEnum):
     NO_WAY = (
         "no way to it",
         "obstacles or no-fly zones, which are named, close it off from every UAS that could cover "
-        "it; routes keep 1 m more than the safe distances",
+        "it; routes keep 1 m more than the safe distances, less for small vehicles",
     )
     TOO_FAR = (
         "out of reach",

@@ -32,6 +32,7 @@ N_ROW_COLUMNS = BOUND + 1
 
 _TORQUE_COST = 30.0  # settles 12 m/s in about 7 s, near the time optimum
 _QUICK_S = 4.4  # the shipped vehicles lean over and stop from full speed in hardly more at best
+_STEPS_S = 0.5  # of a scale for each second of a step
 _REFERENCE_SHARE = 0.999  # of the speed limit: a bound that is only approached is certified
 _SETTLED_S = 10.0
 _LONGEST_S = 60.0
@@ -72,17 +73,23 @@ def horizontal_axis(vehicle: VehicleParams, dt_s: float) -> tuple[FloatArray, Fl
     return axis_A, -B[chain, S.TAU_Y] * forward * vehicle.airframe.inertia_kgm2[1]
 
 
-def time_scale(vehicle: VehicleParams) -> float:
-    """By what the times of the velocity loop, and of guidance, are multiplied: at most 1.
+def time_scale(vehicle: VehicleParams, dt_s: float) -> float:
+    """By what the times of the velocity loop, where it is below 1, and of guidance are multiplied.
 
     1 for vehicles that take as long to stop as the shipped ones, or longer: the loop is as quick
     for a small step, and the governor holds it back. One that could stop in a fourth of the time
-    has half of it: tilt follows its own loop, and the next sample comes no sooner.
+    has half of it, since tilt follows its own loop. And no less than half a step: a velocity is
+    held that long, and what is steered more quickly swings.
+
+    Args:
+        vehicle: Parameters.
+        dt_s: Length of a step [s].
     """
     limits = vehicle.limits
     most_mps2 = vehicle.airframe.gravity_mps2 * math.tan(limits.tilt_max_rad)
     leaning_s = 2.0 * math.sqrt(limits.tilt_max_rad / limits.angular_acceleration_xy_max_radps2)
-    return min(math.sqrt((limits.v_xy_max_mps / most_mps2 + leaning_s) / _QUICK_S), 1.0)
+    quickness = math.sqrt((limits.v_xy_max_mps / most_mps2 + leaning_s) / _QUICK_S)
+    return max(min(quickness, 1.0), _STEPS_S * dt_s)
 
 
 @lru_cache(maxsize=64)
@@ -100,7 +107,7 @@ def design_velocity_loop(vehicle: VehicleParams, dt_s: float) -> VelocityLoop:
     axis_A, axis_B = horizontal_axis(vehicle, dt_s)
     A, B = axis_A[1:, 1:], axis_B[1:, None]
     # three integrators in a row: times go with the sixth root
-    quickness = time_scale(vehicle)
+    quickness = min(time_scale(vehicle, dt_s), 1.0)
     cost = _TORQUE_COST * quickness**6
     P = solve_discrete_are(A, B, np.diag([1.0, 0.0, 0.0]), np.array([[cost]]))
     gain = np.linalg.solve(cost + B.T @ P @ B, B.T @ P @ A)[0]

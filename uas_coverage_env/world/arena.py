@@ -285,7 +285,7 @@ def _uas(scenario: Scenario) -> NDArray[np.void]:
                 limits.v_up_max_mps,
                 limits.v_down_max_mps,
                 dod_per_s(vehicle, entry.dod_max),  # the battery is nearly empty then
-                time_scale(vehicle),
+                time_scale(vehicle, scenario.dt_s),
                 sensors_of(scenario, entry),
             )
         )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.mission.access import Access
 from uas_coverage_env.mission.learnt_wind import MEAN_HEIGHT_M
 from uas_coverage_env.planning.reserves import TOUR, TOUR_SCARCE
 from uas_coverage_env.planning.routing import (
@@ -67,12 +68,17 @@ class View:
 
 
 class Schedule:
-    """The order of the swarm, kept up to date."""
+    """The order of the swarm, kept up to date.
+
+    Attributes:
+        access: Which waypoints have a way to them.
+    """
 
     def __init__(self, brief: MissionBrief, effort: SearchEffort) -> None:
         self._brief, self.legs, self._packs = brief, Legs(brief), Packs.of(brief)
         self._wind_mps, self._knows_wind = np.zeros(2), False
         self._can_cover, self._effort = brief.can_cover, effort
+        self.access = Access(brief)
         self._until_s = brief.max_steps * brief.dt_s
         self.order = empty_routes(len(brief.uas))
         self._reserve = TOUR
@@ -266,6 +272,11 @@ class Schedule:
 
         return FreshPacks.seen(self._packs, view.swarm, self._until_s - view.time_s, problem)
 
+    @property
+    def closed_off(self) -> NDArray[np.bool_]:
+        """(W,) waypoints without a way to them: no UAS is sent there."""
+        return ~self.access.has_way.any(axis=0)
+
     def problem(self, view: View) -> RoutingProblem:
         """The routing problem of a moment."""
         # it is unknown when a blocked waypoint opens: late enough to do other work before, and soon
@@ -277,10 +288,11 @@ class Schedule:
             release_s = np.maximum(release_s, view.asked_in_s)
         return RoutingProblem.seen(
             self._brief,
-            view,
+            replace(view, uncovered=view.uncovered & ~self.closed_off),
             self.legs,
             view.may_work,
             self._reserve,
             release_s=release_s,
+            forbidden=~self.access.has_way,
             pace=self.pace,
         )

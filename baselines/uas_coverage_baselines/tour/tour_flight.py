@@ -125,8 +125,9 @@ class TourFlight:
     @property
     def given_up(self) -> dict[int, str]:
         """Waypoints that are left out or given up, and why in a few words."""
-        left_out = self.schedule.order.left_out.tolist()
-        return dict.fromkeys(left_out, "its order leaves it out") | self._guided.given_up
+        left_out = dict.fromkeys(self.schedule.order.left_out.tolist(), "its order leaves it out")
+        closed = np.flatnonzero(self.schedule.closed_off).tolist()
+        return left_out | self._guided.given_up | dict.fromkeys(closed, "no way to it")
 
     def is_idle(self, swarm: SwarmState) -> bool:
         """Whether a UAS flies home, with no visit left."""
