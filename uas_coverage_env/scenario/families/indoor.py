@@ -31,7 +31,7 @@ _FROM_JAMB_M = 1.2
 _STARTS_IN_ROW = 4
 _SAFE_M, _MARGIN_M = 0.1, 0.1
 _WALKS_MPS, _TURNS_M = (0.6, 1.2), 1.5
-_STEPS, _DT_S = 1600, 0.25
+_STEPS, _DT_S = 2000, 0.2
 
 
 def indoor(rng: Rng, size: Size) -> Scenario:
