@@ -8,7 +8,6 @@ space; which of both comes first alternates. Times are those of the processor, t
 the program. Printed are medians and ranges, and of the ratio of both times of a decision.
 """
 
-from dataclasses import asdict
 from typing import Annotated
 
 import numpy as np
@@ -47,8 +46,8 @@ def main(
             break
         order = list(planners) if decision % 2 else list(planners)[::-1]
         commands = {name: planners[name].act(swarm) for name in order}
-        solved = {name: asdict(planners[name].last_program) for name in planners}
-        rows.append([[solved[name][figure] for figure in FIGURES] for name in planners])
+        programs = [planner.last_program for planner in planners.values()]
+        rows.append([[getattr(program, figure) for figure in FIGURES] for program in programs])
         world.step(commands["plane"])
     table = Table("", "plane", "space", "plane over space")
     for k, figure in enumerate(FIGURES):
@@ -57,7 +56,8 @@ def main(
         table.add_row(
             figure, *(f"{np.median(c):.3g} ({c.min():.3g} to {c.max():.3g})" for c in columns)
         )
-    table.add_row("sum of processor_s", *(f"{s:.3g}" for s in np.array(rows)[..., 3].sum(axis=0)))
+    seconds = np.array(rows)[..., FIGURES.index("processor_s")].sum(axis=0)
+    table.add_row("sum of processor_s", *(f"{s:.3g}" for s in seconds))
     Console(width=120).print(table)
 
 

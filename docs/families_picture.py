@@ -14,7 +14,7 @@ from uas_coverage_env.scenario.families import BUILT_IN, Family
 from uas_coverage_env.simulation import World
 
 PICTURE = Path(__file__).parent / "pictures" / "families.png"
-TILE_PX, COLUMNS, SEED = 400, 4, 2
+TILE_PX, COLUMNS, SEED = 400, 5, 2
 
 
 SIZED = {name: family for name, family in BUILT_IN.items() if isinstance(family, Family)}
@@ -37,6 +37,7 @@ def main() -> None:
     for family in SIZED.values():
         scenario = family.sized(n_uas=(3, 3), n_waypoints=(24, 24)).of_seed(SEED)
         tiles.append(picture(scenario, World(scenario).swarm_state(), size_px=TILE_PX))
+    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % COLUMNS)
     rows = [np.hstack(tiles[k : k + COLUMNS]) for k in range(0, len(tiles), COLUMNS)]
     image = Image.fromarray(np.vstack(rows)).quantize(128)
     image.save(PICTURE, optimize=True)

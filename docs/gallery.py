@@ -26,7 +26,7 @@ from uas_coverage_env.simulation import World
 PICTURES = Path(__file__).parent / "pictures"
 TILE_PX, COLUMNS, TITLE_PX = 400, 3, 28
 PAGE_PX = (1280, 800)
-SCENARIOS = ("village", "gasche2025", "corridor", "open_field", "generated:3", "streets:2")
+SCENARIOS = ("village", "gasche2025", "corridor", "open_field", "indoor", "streets:2")
 PLANNERS = (
     *("nearest-waypoint", "lawnmower", "tour"),
     *("trajectory", "learned-route", "learned-velocity"),

@@ -11,7 +11,7 @@ import pettingzoo
 _MODULE = re.compile(r"uas_coverage_(v(\d+))")
 """Of a version of the environments; its version is `VERSION` there."""
 
-LEVEL_NAMES = ("easy", "medium", "hard", "extreme", "air-taxi")
+LEVEL_NAMES = ("easy", "medium", "hard", "extreme", "air-taxi", "indoor")
 """Those of `tasks.LEVELS`, which is not imported here: a test compares them."""
 
 _TASKS = "uas_coverage_env.tasks.make"

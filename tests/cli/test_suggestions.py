@@ -51,7 +51,10 @@ def test_a_misspelt_name_is_answered_with_the_one_that_was_meant(words, answer, 
 def test_a_name_that_is_like_none_is_answered_with_them_all(capsys):
     assert main(["run", "atlantis"]) == 2
     err = capsys.readouterr().err
-    assert "take air_taxi, corridor, gasche2025, karhula, mixed_fleet, open_field, village," in err
+    assert (
+        "take air_taxi, corridor, gasche2025, indoor, karhula, mixed_fleet, open_field, village,"
+        in err
+    )
     assert did_you_mean("", ["village"], "take village") == "take village"
     assert did_you_mean("a3c", ["ppo", "sac"], "take ppo or sac") == "take ppo or sac"
 

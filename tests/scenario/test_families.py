@@ -14,9 +14,11 @@ from uas_coverage_env.scenario import families as package
 from uas_coverage_env.scenario.families import installed_families
 from uas_coverage_env.scenario.families.open_field import open_field
 from uas_coverage_env.scenario.families.site import CLEARANCE_M, GAP_M, Size
+from uas_coverage_env.world.arena import build_arena
 
 SIZED = [name for name, family in package.BUILT_IN.items() if isinstance(family, Family)]
 SUFFICIENT = [name for name in SIZED if name != "low-charge"]
+OUTDOORS = [name for name in SIZED if name != "indoor"]
 SMALL = {"n_uas": (1, 3), "n_waypoints": (6, 12)}
 
 
@@ -39,7 +41,7 @@ def test_nothing_is_doubtful_about_a_draw(name):
         assert 6 <= len(scenario.waypoints) <= 12
 
 
-@pytest.mark.parametrize("name", SIZED)
+@pytest.mark.parametrize("name", OUTDOORS)
 def test_centres_and_starts_keep_all_distances(name):
     for seed in range(6):
         scenario = drawn(name, seed)
@@ -50,7 +52,7 @@ def test_centres_and_starts_keep_all_distances(name):
         assert scenario.fence.signed_distance(centres).max() < -1.4
 
 
-@pytest.mark.parametrize("name", [name for name in SIZED if name not in ("walls", "air-taxi")])
+@pytest.mark.parametrize("name", [name for name in OUTDOORS if name not in ("walls", "air-taxi")])
 def test_every_centre_has_a_free_way_up(name):
     scenario = drawn(name, 3)
     top_m = max((-hull.vertices_m[:, 2].min() for hull in scenario.hulls), default=0.0)
@@ -59,6 +61,19 @@ def test_every_centre_has_a_free_way_up(name):
         north_m, east_m, down_m = waypoint.position_m
         line = np.array([(north_m, east_m, z) for z in np.arange(down_m, -49.0, -1.0)])
         assert clearances(scenario, line).min() >= CLEARANCE_M
+
+
+def test_every_room_has_a_door_and_starts_and_centres_keep_clear_of_walls():
+    for seed in range(6):
+        scenario = drawn("indoor", seed, n_uas=(2, 9), n_waypoints=(8, 12))
+        assert scenario.planar is not None
+        places = [place.position_m for place in scenario.waypoints]
+        places += [uas.start_m for uas in scenario.uas]
+        assert clearances(scenario, np.array(places)).min() > 0.7
+        assert np.isfinite(build_arena(scenario).node_distance_m.min(axis=1)).all()
+        person = scenario.moving_positions(np.arange(0.0, 400.0, 0.5))[:, 0]
+        assert scenario.fence.signed_distance(person).max() < -0.5
+        assert clearances(scenario, person).min() > 0.5
 
 
 def test_walls_reach_the_ceiling_and_have_gaps_to_pass():

@@ -39,6 +39,7 @@ def test_the_shipped_scenarios_load_by_name_and_give_no_warning():
         "air_taxi",
         "corridor",
         "gasche2025",
+        "indoor",
         "karhula",
         "mixed_fleet",
         "open_field",

@@ -106,7 +106,14 @@ def test_the_spec_of_a_level_is_plain_text():
 
 def test_assistants_are_on_in_the_easy_ones_and_off_in_the_hard_ones():
     on = {level: task.return_mode and task.safety_filter for level, task in LEVELS.items()}
-    assert on == {"easy": True, "medium": True, "hard": False, "extreme": False, "air-taxi": True}
+    assert on == {
+        "easy": True,
+        "medium": True,
+        "hard": False,
+        "extreme": False,
+        "air-taxi": True,
+        "indoor": True,
+    }
 
 
 def test_faults_of_the_last_level_are_those_of_its_table_and_repeat():

@@ -68,7 +68,7 @@ class Planar(StrictModel):
         return ConvexPolytope(
             np.vstack([upright, [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]]),
             np.append(offsets_m, [high_m, -low_m]),
-            [(*place_m, z) for z in (low_m, high_m) for place_m in outline_m],
+            np.array([(*place_m, z) for z in (low_m, high_m) for place_m in outline_m]),
         )
 
     def section(self, body: ConvexPolytope) -> ConvexPolytope:

@@ -97,6 +97,14 @@ LEVELS: Mapping[str, Task] = {
             # of some 20 kWh each
             reward_weights={"energy": 2e-5},
         ),
+        Task(
+            level="indoor",
+            meaning="two or three small UAS at one height in rooms along a corridor, in which a "
+            "person walks",
+            families=_families("indoor", n_uas=(2, 3), n_waypoints=(8, 14)),
+            return_mode=True,
+            safety_filter=True,
+        ),
     )
 }  # fmt: skip
 """Name -> level, from easy to hard and then of other sizes, in the first version of the

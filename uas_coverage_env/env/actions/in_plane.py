@@ -7,6 +7,7 @@ from typing import Any
 from uas_coverage_env.autopilot.control import write_command
 from uas_coverage_env.compiled.kernels import inlined_kernel
 from uas_coverage_env.entities.commands import ACCELERATION as OF_ACCELERATION
+from uas_coverage_env.entities.commands import N_VALUES
 from uas_coverage_env.entities.commands import VELOCITY as OF_VELOCITY
 from uas_coverage_env.entities.commands import WRENCH as OF_WRENCH
 from uas_coverage_env.env.actions.acceleration import ACCELERATION
@@ -34,7 +35,7 @@ def _write_acceleration(arena, state, tables, learners, i, parameters, values, c
 @inlined_kernel
 def _write_wrench(arena, state, tables, learners, i, parameters, values, command):
     write_command(command, OF_WRENCH, 0.0, values[0], values[1])
-    command.values[3] = values[2]
+    command.values[N_VALUES - 1] = values[2]
 
 
 def _express_finely(arena, state, tables, learners, i, parameters, command):
@@ -47,6 +48,7 @@ def _of(kind: ActionKind, kept: slice, write: Any, express: Any = None) -> Actio
     """A kind with some of its numbers, which its kernel takes."""
     own_ranges, own_express = kind.ranges, express or kind.express
     assert own_ranges is not None
+    assert own_express is not None
 
     def ranges(vehicle: VehicleParams, scenario: Scenario) -> Sequence[Range]:
         return own_ranges(vehicle, scenario)[kept]
