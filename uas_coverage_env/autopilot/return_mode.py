@@ -38,12 +38,11 @@ _AMPLE, _AMPLE_S = 2.0, 60.0
 """With so many times the way home left [-], and so many seconds, what called a UAS home was a gust.
 """
 
-
 _HELD_UP_S = 60.0
 """By how much longer than at full speed it is held up at most [s]: others are met as often on a way
 of 20 km as on one of 1.4 km, on which a UAS of 12 m/s loses as much. Chosen by hand."""
 
-_UNHINDERED = RETURN_MODE._replace(speed_share=1.0)
+UNHINDERED = RETURN_MODE._replace(speed_share=1.0)
 
 
 @kernel
@@ -53,7 +52,7 @@ def seconds_home(arena, i, x):
     altitude_m = max(-x[S.Z] + uas.home_m[2], 0.0)
     speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
     way_m = path_length_home_m(arena, i, x)
-    quickly_s = flight_seconds(_UNHINDERED, speeds, 0.0, way_m, 0.0, altitude_m)
+    quickly_s = flight_seconds(UNHINDERED, speeds, 0.0, way_m, 0.0, altitude_m)
     held_up_s = flight_seconds(RETURN_MODE, speeds, 0.0, way_m, 0.0, altitude_m)
     return min(held_up_s, quickly_s + _HELD_UP_S)
 
