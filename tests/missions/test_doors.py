@@ -92,6 +92,15 @@ def test_the_way_home_through_a_door_takes_no_longer_than_return_mode_expects(do
     assert state.uncovered.tolist() == [True, False]
 
 
+def test_return_mode_knows_what_a_door_costs_at_which_guidance_comes_to_rest():
+    seconds = []
+    for door_m in (0.6, 0.55):
+        world = World(rooms(door_m))
+        world.state.x[0, :3] = 1.0, 8.5, -1.2
+        seconds.append(flight_home(world.arena, 0, world.state.x[0])[0])
+    assert seconds[1] > seconds[0] + 5.0
+
+
 def test_of_a_short_mission_return_mode_keeps_a_tenth_of_the_clock():
     for steps, reserve_s in ((400, 8.0), (3_000, 30.0)):
         (kept_s,) = World(rooms(max_steps=steps)).arena.rules["clock_reserve_s"]
