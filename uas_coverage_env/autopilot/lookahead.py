@@ -28,7 +28,8 @@ PLENTY_M = 2.0
 """More distance to spare than this makes no difference; obstacles farther away are skipped [m]."""
 
 SURPRISE_S = 1.0
-"""What moves may turn: its keep-out is widened by how far it goes in this time [s]. Chosen by hand;
+"""What moves may turn: its keep-out is widened by how far it goes in this time, or less of it for a
+UAS that is quicker than the shipped multirotors (`governor.time_scale`) [s]. Chosen by hand;
 `benchmarks/safety_filter.py` shows how many UAS are hit."""
 
 _STILL_MPS, _STILL_RAD = 0.02, 0.004
@@ -246,7 +247,7 @@ def required_from(arena, step, i, m):
     north_mps, east_mps, down_mps = velocity_mps[0], velocity_mps[1], velocity_mps[2]
     speed_mps = math.sqrt(north_mps * north_mps + east_mps * east_mps + down_mps * down_mps)
     required_m = arena.uas[i].radius_m + arena.moving[m].safe_distance_m
-    return required_m + SURPRISE_S * speed_mps
+    return required_m + SURPRISE_S * min(arena.uas[i].time_scale, 1.0) * speed_mps
 
 
 @rare_kernel

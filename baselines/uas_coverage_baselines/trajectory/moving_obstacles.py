@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_baselines.trajectory.space import Body
+from uas_coverage_env.autopilot.lookahead import SURPRISE_S
 from uas_coverage_env.geometry.round_shapes import outside_upright_m
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.planning.backup.course import NO_NEARER_M, apart_m
+from uas_coverage_env.vehicle.governor import time_scale
 from uas_coverage_env.vehicle.layout import VX, VZ
 from uas_coverage_env.world import SwarmState
 
@@ -23,7 +25,6 @@ _SEEN_S = 400.0
 _PARKED_S = 25.0  # as long as what is parked is expected to stay, in plans; not in what is flown
 _STILL_MPS = 1e-9
 _WITHIN = 0.8  # share of a waypoint's radius from which it is covered beside what moves
-_SURPRISE_S = 1.0  # what moves may turn: its keep-out is widened by how far it goes in this time
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class MovingObstacles:
         dt_s: Length of a step.
         n_obstacles: How many of them, the first ones, are moving obstacles; the others are UAS.
         lasts_s: Until the mission ends, at the latest.
+        surprise_s: They may turn: keep-outs are widened by how far they go in this time.
     """
 
     position_m: FloatArray
@@ -49,6 +51,7 @@ class MovingObstacles:
     dt_s: float
     n_obstacles: int
     lasts_s: float
+    surprise_s: float = SURPRISE_S
 
     @staticmethod
     def seen(
@@ -78,6 +81,7 @@ class MovingObstacles:
             brief.dt_s,
             len(obstacles),
             brief.dt_s * brief.max_steps,
+            SURPRISE_S * min(1.0, max(time_scale(v, brief.dt_s) for v in set(brief.vehicles))),
         )
 
     def __len__(self) -> int:
@@ -106,7 +110,7 @@ class MovingObstacles:
     @property
     def surprise_m(self) -> FloatArray:
         """(M,) how far each goes in the time in which it may turn."""
-        return _SURPRISE_S * np.linalg.norm(self.velocity_mps, axis=1)
+        return self.surprise_s * np.linalg.norm(self.velocity_mps, axis=1)
 
     def path_m(self, m: int, steps: int) -> FloatArray:
         """(steps+1, 3) predicted centres."""
