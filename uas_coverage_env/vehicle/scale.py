@@ -1,7 +1,7 @@
 """What a fleet's size makes of lengths and times: the one place from which they follow.
 
 The lengths of guidance, routes, filter and planners were chosen, and measured, with the shipped
-vehicles, which stop within 25 to 30 m at every sample time from 0.1 to 2 s. What guidance flies
+vehicles, which stop within 25 to 30 m at every sample time from 0.02 to 2 s. What guidance flies
 beside its route, and what it needs to turn and to stop, goes with the way that the inner loop takes
 to stop. So every such length is a multiple of `length_scale`: 1 for vehicles that stop in as much,
 less in proportion for those that stop sooner, more for those that stop later. Which lengths these
@@ -20,6 +20,9 @@ _LOOKAHEAD_S = 14.0
 
 _IN_WIND = 1.15
 """In wind a heavier or faster vehicle is taken to brake so many times as long as in still air."""
+
+_OF_MISSION = 0.1
+"""Of the time of a short mission, what is kept of the clock at most [-]."""
 
 SLOW_SHARE = 0.25
 """Of the highest speed, what is slow [-]: 3 m/s of the shipped vehicles."""
@@ -51,6 +54,3 @@ def braking_s(vehicles: Iterable[VehicleParams], dt_s: float) -> float:
 def clock_reserve_s(most_s: float, mission_s: float) -> float:
     """What of the clock is kept: so many seconds, of a short mission a tenth at most [s]."""
     return min(most_s, _OF_MISSION * mission_s)
-
-
-_OF_MISSION = 0.1

@@ -275,7 +275,7 @@ class Schedule:
     @property
     def closed_off(self) -> NDArray[np.bool_]:
         """(W,) waypoints without a way to them: no UAS is sent there."""
-        return ~self.access.has_way.any(axis=0)
+        return np.logical_not(self.access.has_way.any(axis=0))
 
     def problem(self, view: View) -> RoutingProblem:
         """The routing problem of a moment."""
