@@ -3,10 +3,13 @@
 import numpy as np
 from small_worlds import meadow, waypoint
 
+from uas_coverage_env import load_planner, rollout
 from uas_coverage_env.draw import Picture
 from uas_coverage_env.draw.frame import Frame
 from uas_coverage_env.draw.labels import metres
 from uas_coverage_env.draw.terrain import height_words, lintels, terrain
+from uas_coverage_env.flight.scene_history import SceneHistory
+from uas_coverage_env.replay.scene_data import scene_data
 from uas_coverage_env.scenario.walls import Door, Wall
 from uas_coverage_env.simulation import World
 
@@ -68,3 +71,9 @@ def test_a_picture_of_a_room_says_how_high_a_uas_is_to_the_decimetre():
 
     assert (drawn(low, -1.2) != drawn(low, -1.4)).any()
     assert (drawn(scenario, -1.2) == drawn(scenario, -1.4)).all()
+
+
+def test_a_replay_page_knows_what_hangs_above_a_doorway():
+    flight = rollout(room(height_m=20.0), load_planner("hover"), max_steps=2)
+    obstacles = scene_data(SceneHistory.of(flight))["obstacles"]
+    assert [obstacle.get("overhead", False) for obstacle in obstacles] == [False, True, False]

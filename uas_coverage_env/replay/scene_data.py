@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 
 from uas_coverage_env.draw import colours
 from uas_coverage_env.draw.marks import heavy_waypoints
+from uas_coverage_env.draw.terrain import lintels
 from uas_coverage_env.flight.scene_history import SceneHistory
 from uas_coverage_env.geometry import ConvexPolytope
 from uas_coverage_env.geometry.outline import outline_of
@@ -65,10 +66,15 @@ def _obstacles(history: SceneHistory) -> list[dict[str, Any]]:
             "kind": obstacle.kind or "",
             "colour": colours.hex_of(colours.of_obstacle(obstacle.kind)),
             "from": int(since),
+            **({"overhead": True} if overhead else {}),
             **_body(hull),
         }
-        for obstacle, hull, since in zip(
-            scenario.obstacles, scenario.hulls, history.obstacle_from, strict=True
+        for obstacle, hull, since, overhead in zip(
+            scenario.obstacles,
+            scenario.hulls,
+            history.obstacle_from,
+            lintels(scenario),
+            strict=True,
         )
     ]
 

@@ -77,8 +77,8 @@ export class Cards {
       const shown = [
         mode,
         `${(100 * soc).toFixed(1)} %`,
-        `${(-down).toFixed(0)} m high, ${speed.toFixed(1)} m/s`,
-        `N ${north.toFixed(0)} m, E ${east.toFixed(0)} m`,
+        `${this.flight.metres(-down)} m high, ${speed.toFixed(1)} m/s`,
+        `N ${this.flight.metres(north)} m, E ${this.flight.metres(east)} m`,
         flies ? spareWords(spare) : "",
       ];
       shown.forEach((text, n) => {

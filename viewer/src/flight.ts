@@ -27,6 +27,8 @@ export const FEW = 8;
 /** Charge beyond the way home below which it is said to be little. */
 export const LITTLE_SPARE = 0.1;
 
+const LOW_M = 10;
+
 export class Flight {
   constructor(public data: FlightData) {}
 
@@ -92,6 +94,12 @@ export class Flight {
   energyOf(sample: number, i: number): number {
     const { values, unit } = this.data.energy;
     return values[sample * this.uas + i] * unit;
+  }
+
+  /** A height or a place in words [m]: in rooms, that are lower than `LOW_M`, with decimals. */
+  metres(value: number): string {
+    const heights = this.scene.fence.corners.map((corner) => corner[2]);
+    return value.toFixed(Math.max(...heights) - Math.min(...heights) < LOW_M ? 1 : 0);
   }
 
   position(sample: number, i: number): Point3 {

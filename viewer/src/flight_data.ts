@@ -21,6 +21,8 @@ export interface Obstacle extends Body {
   colour: string;
   /** Sample from which it stands: events add some. */
   from: number;
+  /** Above a doorway: on the map its outline alone, so that the door is seen. */
+  overhead?: boolean;
 }
 
 /** Where a UAS is to land, from a sample on. */

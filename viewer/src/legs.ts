@@ -47,7 +47,7 @@ export function legs(flight: Flight, i: number, by: (number | null)[]): Leg[] {
 /** A waypoint in words: where, and when it was covered by whom, how high and fast. */
 export function waypointWords(flight: Flight, w: number, by: (number | null)[]): string {
   const { at } = flight.scene.waypoints[w];
-  const place = `Waypoint ${w + 1}, N ${at[0].toFixed(0)} m, E ${at[1].toFixed(0)} m, ${(-at[2]).toFixed(1)} m high`;
+  const place = `Waypoint ${w + 1}, N ${flight.metres(at[0])} m, E ${flight.metres(at[1])} m, ${(-at[2]).toFixed(1)} m high`;
   const i = by[w];
   if (i === null) return `${place}: not covered`;
   const k = flight.data.covered_at[w];
@@ -74,8 +74,8 @@ export function legWords(flight: Flight, { uas: i, from, to, waypoint }: Leg): s
   const end = waypoint === null ? endWords(flight, i) : `to waypoint ${waypoint + 1}`;
   return (
     `${flight.scene.uas[i].name} ${end}, ${seconds(flight, from)} to ${seconds(flight, to)}: ` +
-    `${way.toFixed(0)} m at ${(way / ((to - from) * dt_s)).toFixed(1)} m/s, ` +
-    `${low.toFixed(0)} to ${high.toFixed(0)} m high, ${energy.toFixed(2)} Wh`
+    `${flight.metres(way)} m at ${(way / ((to - from) * dt_s)).toFixed(1)} m/s, ` +
+    `${flight.metres(low)} to ${flight.metres(high)} m high, ${energy.toFixed(2)} Wh`
   );
 }
 

@@ -151,7 +151,8 @@ export class MapView implements View {
     pen.globalAlpha = 1;
     for (const obstacle of scene.obstacles) {
       if (obstacle.from > sample) continue;
-      this.polygon(obstacle.outline, dim(obstacle.colour), darker(obstacle.colour, 0.45), 1.2);
+      const fill = obstacle.overhead ? null : dim(obstacle.colour);
+      this.polygon(obstacle.outline, fill, darker(obstacle.colour, 0.45), obstacle.overhead ? 0.6 : 1.2);
     }
     this.polygon(scene.fence.outline, null, colour("--fence"), 1.8);
     for (const { homes, colour: hex } of scene.uas) {

@@ -7,8 +7,9 @@ import { table } from "../src/table";
 import { someFlight } from "./some_flight";
 
 /** The first UAS covers the first waypoint at the second sample, nobody the other one. */
-function flown(): Flight {
+function flown(ceiling = 30): Flight {
   const data = someFlight();
+  data.scene.fence.corners = [[0, 0, 0], [9, 9, -ceiling]];
   data.scene.waypoints = [
     { at: [1, 2, -3.2], radius: 4, heavy: false, from: 0, until: null },
     { at: [40, 40, -3], radius: 4, heavy: false, from: 0, until: null },
@@ -68,4 +69,10 @@ test("the table has a row for each UAS and sample until its end", () => {
   assert.equal(rows[0].split(",").length, 12);
   assert.equal(rows[2], "1,0.5,uas_1,1,2,-3,0.99,0.25,15,10,covering,1");
   assert.match(rows[4], /^1,0,"the ""second"", of two",5,0,0,/);
+});
+
+test("in a room, places and heights have decimals", () => {
+  const flight = flown(2.5);
+  assert.equal(flight.metres(1.23), "1.2");
+  assert.match(waypointWords(flight, 0, coveredBy(flight)), /^Waypoint 1, N 1\.0 m, E 2\.0 m, 3\.2 m high/);
 });
