@@ -124,7 +124,7 @@ def judge_contacts(arena, state, nonlinear, outcome):
     state.step[0] += 1
 
 
-class OfUas(NamedTuple):
+class EachUas(NamedTuple):
     """A stage of a step for one UAS, whatever the others do in it.
 
     The processor flies all through it in turn, a GPU has a thread for each.
@@ -137,7 +137,7 @@ class OfUas(NamedTuple):
 class WorldStages(NamedTuple):
     """What `advance` does before and after it looks for contacts with obstacles, as there.
 
-    The first two may be `OfUas`.
+    The first two may be `EachUas`.
     """
 
     prepare: Any
@@ -206,7 +206,7 @@ def plain_stages_with(call_features: Any, assist_one: Any) -> WorldStages:
             assist_one(assistants, arena, as_measured(state), nonlinear, outcome, i)
 
     judge = stages_with(call_features, fly).judge
-    return WorldStages(OfUas(prepare), OfUas(_move_still), judge)
+    return WorldStages(EachUas(prepare), EachUas(_move_still), judge)
 
 
 STAGES = stages_with(call_features, fly)

@@ -24,7 +24,7 @@ from uas_coverage_env.env.report import (
     STATUS,
 )
 from uas_coverage_env.env.versions import Version
-from uas_coverage_env.simulation.step import STAGES, OfUas, WorldStages
+from uas_coverage_env.simulation.step import STAGES, EachUas, WorldStages
 from uas_coverage_env.world.contacts import check_obstacles_of
 
 ACCEPTED = -1
@@ -94,19 +94,21 @@ class Stages(NamedTuple):
     """The stages of a step of a mission, in their order.
 
     A single mission flies through all of them; a batch lets many fly through one before the next
-    begins, and a GPU all UAS at once through those that are `OfUas`, with the same results.
+    begins, and a GPU all UAS at once through those that are `EachUas`, with the same results.
     """
 
     flight: tuple[Any, ...]
-    """Fly and pay: kernels of the arguments `STAGE`, or `OfUas`. All actions are finite; at the end
-    `scratch.looks` says who looks around."""
+    """Fly and pay: kernels of the arguments `STAGE`, or `EachUas`. All actions are finite; at the
+    end `scratch.looks` says who looks around."""
     looks: tuple[Any, ...]
     """Observe, see `observe.looks_with`."""
 
     @property
     def whole(self) -> "Stages":
         """The same for all UAS of a mission: of the arguments `STAGE` and `LOOK_AROUND`."""
-        flight = (of_all(each.kernel) if isinstance(each, OfUas) else each for each in self.flight)
+        flight = (
+            of_all(each.kernel) if isinstance(each, EachUas) else each for each in self.flight
+        )
         return Stages(tuple(flight), tuple(map(look_around, self.looks)))
 
 
@@ -161,12 +163,12 @@ def stages_of(
         judge_world(arena, state, rules.nonlinear != 0, rules.code, scratch.outcome)
 
     first: tuple[Any, ...] = act, move
-    if isinstance(prepare, OfUas) and isinstance(move_world, OfUas):
+    if isinstance(prepare, EachUas) and isinstance(move_world, EachUas):
         first = _of_uas(write_command, prepare.kernel, move_world.kernel)
-    return Stages((*first, OfUas(meet), judge, _pay_with(compute_rewards)), looks)
+    return Stages((*first, EachUas(meet), judge, _pay_with(compute_rewards)), looks)
 
 
-def _of_uas(write_command: Any, prepare: Any, move_world: Any) -> tuple[OfUas, OfUas]:
+def _of_uas(write_command: Any, prepare: Any, move_world: Any) -> tuple[EachUas, EachUas]:
     """The first two stages where each UAS flies whatever the others do."""
 
     @inlined_kernel
@@ -181,7 +183,7 @@ def _of_uas(write_command: Any, prepare: Any, move_world: Any) -> tuple[OfUas, O
     def move(arena, state, tables, learners, scratch, rules, i):
         move_world(arena, state, rules.nonlinear != 0, rules.code, scratch.outcome, i)
 
-    return OfUas(act), OfUas(move)
+    return EachUas(act), EachUas(move)
 
 
 @cache

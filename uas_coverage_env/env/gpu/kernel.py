@@ -5,7 +5,7 @@ an address there, so all kernels of observation, reward, action and features are
 and guidance and return mode where they are asked for. What cannot run there is what makes arrays:
 the safety filter, and the search for a way past overhangs.
 
-A step is a few launches, one after the other. What each UAS does whatever the others do (`OfUas`,
+A step is a few launches, one after the other. What each UAS does whatever the others do (`EachUas`,
 and what it observes) has a thread for each UAS; the rest has one for each mission.
 """
 
@@ -34,7 +34,7 @@ from uas_coverage_env.env.episode.pay import compute_rewards_with
 from uas_coverage_env.env.episode.step import ACCEPTED, STAGE, Rules, stages_of
 from uas_coverage_env.simulation.on_gpu import begin_features_of, stages_on_gpu
 from uas_coverage_env.simulation.pool import arena_of, state_of
-from uas_coverage_env.simulation.step import OfUas
+from uas_coverage_env.simulation.step import EachUas
 from uas_coverage_env.world.arena import ARENA
 
 
@@ -174,7 +174,7 @@ def _begin_with(choices: int, width: int) -> Any:
 @cache
 def _fly_with(stages: tuple[Any, ...], nonlinear: bool, guided: bool) -> Any:
     """The part of a mission, or of a UAS, that flies through stages one after the other."""
-    of_uas = isinstance(stages[0], OfUas)
+    of_uas = isinstance(stages[0], EachUas)
     kernels = [stage.kernel for stage in stages] if of_uas else stages
     run = in_turn(kernels, f"{STAGE}, i" if of_uas else STAGE)
 
@@ -289,7 +289,7 @@ def step_with(pool: ScenarioPool) -> tuple[Launch, ...]:
 
 
 def _is_of_uas(stage: Any) -> bool:
-    return isinstance(stage, OfUas)
+    return isinstance(stage, EachUas)
 
 
 @cache  # to compile it again takes half a minute
