@@ -28,16 +28,13 @@ from uas_coverage_env.entities.state import FLYING, WIND, WorldState
 from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.world.arena import Arena
-from uas_coverage_env.world.height import lowest_altitude
+from uas_coverage_env.world.height import CRUISE_ALTITUDE_M, lowest_altitude
 from uas_coverage_env.world.obstacles import NODE_MARGIN_M
 from uas_coverage_env.world.routes import CLEAR, NO_WAY, ROUND_CORNER, crossing, level_apart, route
 
 LEAD_S = 1.6
 """The inner loop follows a velocity with about this delay; guidance steers from ahead. At scale 1,
 as all times below, see `governor.time_scale` [s]."""
-
-CRUISE_ALTITUDE_M = 8.0
-"""On a longer way UAS do not sink below this altitude above the floor, at scale 1 [m]."""
 
 HEADROOM_M = 0.5
 """Roofs are passed this much above the distance of routes, at scale 1 [m]."""

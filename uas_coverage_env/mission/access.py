@@ -86,7 +86,8 @@ class Access:
     def narrow_gaps(self) -> tuple[Gap, ...]:
         """Doors and gaps that a UAS fits through, but its routes do not; the narrowest first."""
         arena = build_arena(self._brief.as_scenario())
-        tall = np.flatnonzero(arena.obstacles["roof_m"] > arena.rules["ceiling_m"][0])
+        reaches_up = arena.obstacles["roof_m"] > arena.rules["ceiling_m"][0]
+        tall = np.flatnonzero(arena.obstacles["tall"] & reaches_up)
         kept_m, least_m = arena.obstacles["wall_m"], 2.0 * float(arena.uas["radius_m"].max())
         found = []
         for a, b in combinations(tall.tolist(), 2):

@@ -19,6 +19,7 @@ from uas_coverage_env.vehicle.scale import braking_s, clock_reserve_s, length_sc
 from uas_coverage_env.world.broad_phase import EPS_M, N_COLUMNS, obstacle_columns
 from uas_coverage_env.world.corners import route_corners
 from uas_coverage_env.world.events import EVENT_DTYPE, event_records, is_eventful
+from uas_coverage_env.world.height import CRUISE_ALTITUDE_M
 from uas_coverage_env.world.obstacles import (
     OBSTACLE_DTYPE,
     measure,
@@ -180,7 +181,8 @@ def build_arena(
     """The scenario as arrays.
 
     Obstacles that can be flown over without climbing far above the usual waypoint are low, the
-    others are tall: routes go round them over the corners of their widened footprints.
+    others are tall: routes go round them over the corners of their widened footprints. Lintels of
+    doors are passed under where all targets, and what UAS cruise at, are low enough.
 
     Args:
         scenario: The scenario.
@@ -206,7 +208,10 @@ def build_arena(
         scenario, int(rules["lookahead_steps"][0]), bool(rules["disturbed"][0]), margin_m
     )
     route_m = margin_m + route_tube_m(tube_m, margin_m)
-    obstacles, planes = obstacle_records(scenario, radius_m, overfly_m, route_m)
+    starts_m = uas["start_m"][:, 2]
+    cruise_m = rules["floor_m"][0] + rules["length_scale"][0] * CRUISE_ALTITUDE_M
+    highest_m = max(cruise_m, -min(targets_m[:, 2].min(), starts_m.min()))
+    obstacles, planes = obstacle_records(scenario, radius_m, overfly_m, route_m, highest_m)
     measure(obstacles, scenario, float(rules["measured_m"][0]))
     fence = scenario.fence
     rules["fence_first"] = sum(len(rows[1]) for rows in planes)

@@ -4,6 +4,9 @@ from uas_coverage_env.compiled.kernels import inlined_kernel, kernel
 from uas_coverage_env.entities.outcome import BREACH_TOLERANCE_M
 from uas_coverage_env.world.routes import box_apart
 
+CRUISE_ALTITUDE_M = 8.0
+"""On a longer way UAS do not sink below this altitude above the floor, at scale 1 [m]."""
+
 HEIGHT_MARGIN_M = 0.5
 """Commands stay this much above the least height, at scale 1: altitudes are not held to the
 centimetre [m]."""

@@ -1,6 +1,7 @@
 """The fixed obstacles as arrays, for the kernels: hulls, boxes around them, corners of routes."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ _ROUTE_MARGIN_M = 1.0
 NODE_MARGIN_M = 1.0
 """Corners of routes lie this much outside of what routes avoid, so that they see past it; at scale
 1 [m]."""
+
+_NOWHERE_M = 1e7
+"""Added to how far a footprint is away: no route meets it [m]."""
 
 _FIELDS = [
     # rows of `normals`: the hull, and the walls of its footprint widened by wall_m
@@ -57,6 +61,8 @@ _FIELDS = [
     ("top_m", "f8"),
     # there is room below a part of it
     ("overhangs", "?"),
+    # all routes lead under it, through a door
+    ("lintel", "?"),
     # nothing stands there: no contact
     ("no_fly_zone", "?"),
 ]
@@ -95,13 +101,33 @@ def _footprint(corners_m: NDArray[np.float64]) -> ConvexHull:
     return ConvexHull(np.unique(corners_m[:, :2].round(6), axis=0))
 
 
+def underside_m(hull: ConvexPolytope) -> float:
+    """The altitude of the lowest corner [m]."""
+    return -float(hull.vertices_m[:, 2].max())
+
+
+def _is_lintel(hull: ConvexPolytope, doors_m: Iterable[tuple[float, float]]) -> bool:
+    """Whether the middle of a door lies below."""
+    z = float(hull.vertices_m[:, 2].mean())
+    doors = np.array([(*door_m, z) for door_m in doors_m])
+    return len(doors) > 0 and bool((hull.signed_distance(doors) <= 0.0).any())
+
+
 def obstacle_records(
-    scenario: Scenario, radius_m: float, overfly_m: float, route_m: float
+    scenario: Scenario, radius_m: float, overfly_m: float, route_m: float, highest_m: float
 ) -> tuple[
     NDArray[np.void],
     list[tuple[NDArray[np.float64], NDArray[np.float64]]],
 ]:
-    """The obstacles, and the planes of their hulls and footprints."""
+    """The obstacles, and the planes of their hulls and footprints.
+
+    Args:
+        scenario: The scenario.
+        radius_m: Of the largest UAS [m].
+        overfly_m: Roofs up to here are flown over [m].
+        route_m: What routes keep beyond a breach [m].
+        highest_m: The highest altitude at which routes lead past what is not flown over [m].
+    """
     records = np.zeros(len(scenario.obstacles), dtype=OBSTACLE_DTYPE)
     scale = length_scale(scenario.vehicles, scenario.dt_s)
     ground_m = float(-scenario.fence.vertices_m[:, 2].max())
@@ -145,6 +171,9 @@ def obstacle_records(
         record["tall"] = record["roof_m"] > overfly_m
         record["top_m"] = record["roof_m"] - route_m
         record["overhangs"] = overhangs(hull, ground_m, scale)
+        if _is_lintel(hull, scenario.doors_m) and underside_m(hull) - wall_m >= highest_m:
+            planes[-1] = (sides, planes[-1][1] + _NOWHERE_M)
+            record["lintel"], record["tall"], record["overhangs"] = True, False, False
         record["no_fly_zone"] = isinstance(obstacle, NoFlyZone)
     return records, planes
 

@@ -5,12 +5,13 @@ import math
 import numpy as np
 
 from uas_coverage_env.autopilot.control import command_wrench, write_command
-from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, LEAD_S
+from uas_coverage_env.autopilot.guidance import LEAD_S
 from uas_coverage_env.compiled.kernels import allocating_kernel
 from uas_coverage_env.entities.commands import VELOCITY
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.lpv import fly_kinematics
 from uas_coverage_env.world.coverage import away_from_home_m, speed_of
+from uas_coverage_env.world.height import CRUISE_ALTITUDE_M
 
 _LANDING_SHARE = 0.9
 """Of the distance and the speed at which a UAS has landed."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uas_coverage_env.autopilot.control import command_wrench, write_command
-from uas_coverage_env.autopilot.guidance import CRUISE_ALTITUDE_M, guide, target_position
+from uas_coverage_env.autopilot.guidance import guide, target_position
 from uas_coverage_env.autopilot.lookahead import fly_and_brake, fly_kinematically
 from uas_coverage_env.autopilot.room import new_room
 from uas_coverage_env.compiled.kernels import allocating_kernel
@@ -22,7 +22,7 @@ from uas_coverage_env.entities.commands import CLIMB, VELOCITY
 from uas_coverage_env.geometry.segments import signed_distance
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.lpv import fly_kinematics
-from uas_coverage_env.world.height import lowest_altitude
+from uas_coverage_env.world.height import CRUISE_ALTITUDE_M, lowest_altitude
 from uas_coverage_env.world.routes import CLEAR, box_apart, crossing, route
 
 FloatArray = NDArray[np.float64]
