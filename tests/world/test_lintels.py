@@ -10,6 +10,7 @@ from uas_coverage_env.world.arena import build_arena
 ROOM = """
 schema = 1
 name = "two_rooms"
+min_height_m = %(least_m)s
 dt_s = 0.2
 max_steps = 400
 landing_distance_m = 0.3
@@ -46,9 +47,13 @@ weight = 1.0
 """
 
 
-def two_rooms(tmp_path, *, door_m: float = 2.0, waypoint_m: float = -1.2) -> Scenario:
+def two_rooms(
+    tmp_path, *, door_m: float = 2.0, waypoint_m: float = -1.2, least_m: float = 0.0
+) -> Scenario:
     path = tmp_path / "two_rooms.toml"
-    path.write_text(ROOM % {"door_m": door_m, "waypoint_m": waypoint_m}, encoding="utf-8")
+    path.write_text(
+        ROOM % {"door_m": door_m, "waypoint_m": waypoint_m, "least_m": least_m}, encoding="utf-8"
+    )
     return load_scenario(path)
 
 
@@ -61,8 +66,11 @@ def test_routes_lead_below_the_lintel_and_through_nothing_else(tmp_path):
     assert all(record["tall"] for name, record in named.items() if "above" not in name)
 
 
-def test_a_door_below_a_lintel_is_flown_through(tmp_path):
-    flight = rollout(two_rooms(tmp_path), load_planner("nearest-waypoint"), safety_filter=True)
+@pytest.mark.parametrize("least_m", [0.0, 0.5])
+def test_a_door_below_a_lintel_is_flown_through(tmp_path, least_m):
+    flight = rollout(
+        two_rooms(tmp_path, least_m=least_m), load_planner("nearest-waypoint"), safety_filter=True
+    )
     assert flight.figures["coverage"] == 1.0
     assert flight.figures["all_home"]
     assert not flight.figures["violations"]

@@ -1,7 +1,6 @@
 """The fixed obstacles as arrays, for the kernels: hulls, boxes around them, corners of routes."""
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,16 +100,18 @@ def _footprint(corners_m: NDArray[np.float64]) -> ConvexHull:
     return ConvexHull(np.unique(corners_m[:, :2].round(6), axis=0))
 
 
-def underside_m(hull: ConvexPolytope) -> float:
+def _underside_m(hull: ConvexPolytope) -> float:
     """The altitude of the lowest corner [m]."""
     return -float(hull.vertices_m[:, 2].max())
 
 
-def _is_lintel(hull: ConvexPolytope, doors_m: Iterable[tuple[float, float]]) -> bool:
-    """Whether the middle of a door lies below."""
+def _is_lintel(scenario: Scenario, hull: ConvexPolytope) -> bool:
+    """Whether the middle of a door lies below; in a planar mission what is kept tells."""
     z = float(hull.vertices_m[:, 2].mean())
-    doors = np.array([(*door_m, z) for door_m in doors_m])
-    return len(doors) > 0 and bool((hull.signed_distance(doors) <= 0.0).any())
+    doors = np.array([(*door_m, z) for door_m in scenario.doors_m])
+    if scenario.planar is not None or not len(doors):
+        return False
+    return bool((hull.signed_distance(doors) <= 0.0).any())
 
 
 def obstacle_records(
@@ -142,7 +143,8 @@ def obstacle_records(
         footprint = _footprint(widened_m)
         sides = np.column_stack([footprint.equations[:, :2], np.zeros(len(footprint.equations))])
         planes.append((hull.normals, hull.offsets_m))
-        planes.append((sides, footprint.equations[:, 2]))
+        lintel = _is_lintel(scenario, hull) and _underside_m(hull) - wall_m >= highest_m
+        planes.append((sides, footprint.equations[:, 2] + (_NOWHERE_M if lintel else 0.0)))
         low_m, high_m = hull.vertices_m.min(axis=0), hull.vertices_m.max(axis=0)
         record["hull_middle_m"] = (low_m + high_m) / 2
         record["hull_half_m"] = (high_m - low_m) / 2 + EPS_M
@@ -168,12 +170,10 @@ def obstacle_records(
         record["rise_m"] = near_m - max(0.0, float(hull.signed_distance(record["middle_m"])))
         record["wall_m"] = wall_m
         record["roof_m"] = -widened_m[:, 2].min()
-        record["tall"] = record["roof_m"] > overfly_m
+        record["lintel"] = lintel
+        record["tall"] = record["roof_m"] > overfly_m and not lintel
         record["top_m"] = record["roof_m"] - route_m
-        record["overhangs"] = overhangs(hull, ground_m, scale)
-        if _is_lintel(hull, scenario.doors_m) and underside_m(hull) - wall_m >= highest_m:
-            planes[-1] = (sides, planes[-1][1] + _NOWHERE_M)
-            record["lintel"], record["tall"], record["overhangs"] = True, False, False
+        record["overhangs"] = overhangs(hull, ground_m, scale) and not lintel
         record["no_fly_zone"] = isinstance(obstacle, NoFlyZone)
     return records, planes
 
