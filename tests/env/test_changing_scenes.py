@@ -194,7 +194,7 @@ def test_scenes_that_become_equal_are_laid_out_once():
     assert arenas == [1, 1, 1, 2]
     known = [batch.scenario_of(lane) for lane in range(6)]
     assert len({id(scenario) for scenario in known}) == 2
-    assert len({scenario.uas[0].start_m for scenario in known}) == 2
+    assert len({scenario.uas[0].home_m for scenario in known}) == 2
 
 
 def test_pictures_of_a_batch_show_its_scenes():

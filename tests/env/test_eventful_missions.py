@@ -175,9 +175,12 @@ def test_one_agent_for_the_swarm_flies_a_changed_scene_and_its_picture_shows_it(
     assert (np.asarray(env.render()) != np.asarray(before)).mean() > 0.001
 
 
-def test_what_takes_guidance_is_refused_on_a_gpu():
-    scenario = GROUND.model_copy(update={"events": ({"kind": "planner_lost", "at_s": 5.0},)})
-    with pytest.raises(ValueError, match=r"sends UAS home.*\(then = \"hover\"\)"):
+def test_an_event_that_sends_home_past_overhangs_is_refused_on_a_gpu():
+    corners = box((40.0, 40.0, -20.0), (60.0, 60.0, -10.0))
+    canopy = {"name": "canopy", "safe_distance_m": 2.0, "vertices_m": corners}
+    lost = {"kind": "planner_lost", "at_s": 5.0}
+    scenario = GROUND.model_copy(update={"events": (lost,), "obstacles": (canopy,)})
+    with pytest.raises(ValueError, match="an event that sends UAS home, where obstacles overhang"):
         CudaMissions(1, scenario)
 
 

@@ -278,6 +278,7 @@ def test_every_field_of_a_decision_survives_its_file(tmp_path):
         corners_of_all=False,
         data={"Radio": {"range_m": np.array([70.0, 90.0]), "station": np.array(2)}},
         prune=False,
+        planar=True,
     )
     for one in fields(problem):
         default = one.default_factory() if callable(one.default_factory) else one.default

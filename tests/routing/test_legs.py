@@ -100,7 +100,7 @@ def test_a_leg_that_climbs_takes_as_long_as_the_climb():
 def test_the_way_home_ends_at_ones_own_start():
     legs = Legs(MissionBrief.of(scenario(FIELD, ("s500_v2", "s500_v2"))))
     for uas in range(2):
-        assert legs.way_home_s(uas, legs.starts_m[uas]) == 0.0
+        assert legs.way_home_s(uas, legs.homes_m[uas]) == 0.0
         alone = [legs.way_home_s(uas, np.array(place)) for place in FIELD]
         assert legs.home_s[uas] == pytest.approx(alone)
     assert (legs.home_s[0] != legs.home_s[1]).any()

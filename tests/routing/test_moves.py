@@ -24,7 +24,7 @@ def test_turns_cost_what_their_table_says_and_turning_by_90_degrees_saves_time()
         one = task(0, 1, 1).replace(
             waypoints_m=np.array([(100.0, 0.0, -20.0)]),
             position_m=places[:1],
-            start_m=np.array([end_m]),
+            home_m=np.array([end_m]),
             velocity_mps=np.array([(12.0, 0.0)]),
             first_s=np.array([[10.0]]),
             home_s=np.array([[20.0]]),

@@ -37,7 +37,7 @@ def task(seed=0, waypoints=8, uas=2, **changes):
     apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
     records = np.zeros(uas, ROUTED_UAS_DTYPE)
     records["kind"] = records["flown_by"] = np.arange(uas)
-    records["position_m"], records["start_m"] = here, start
+    records["position_m"], records["home_m"] = here, start
     records["velocity_mps"] = rng.uniform(-5.0, 5.0, (uas, 2))
     records["speed_mps"], records["acceleration_mps2"] = speed, 3.0
     records["idle_s"] = np.linalg.norm(here - start, axis=1) / speed
@@ -73,7 +73,7 @@ def seconds_of(task, u, route):
     """Flight time of a route, as the docstrings say, in plain Python."""
     if not len(route):
         return float(task.uas["idle_s"][u])
-    places = [task.uas["position_m"][u], *task.waypoints_m[list(route), :2], task.uas["start_m"][u]]
+    places = [task.uas["position_m"][u], *task.waypoints_m[list(route), :2], task.uas["home_m"][u]]
     towards = places[1] - places[0]
     wanted = task.uas["speed_mps"][u] * towards / math.hypot(*towards)
     lost = task.uas["velocity_mps"][u] - wanted
@@ -211,7 +211,7 @@ def test_waypoints_are_left_out_rather_than_a_battery_emptied(seed, budget_s):
         8,
         waypoints_m=ring,
         position_m=np.zeros((2, 2)),
-        start_m=np.zeros((2, 2)),
+        home_m=np.zeros((2, 2)),
         first_s=np.full((2, 8), 10.0),
         home_s=np.full((2, 8), 14.0),
         between_s=np.stack([apart / 12.0] * 2),
@@ -276,7 +276,7 @@ def test_a_waypoint_that_opens_late_is_waited_for():
     late = problem.replace(release_s=np.array([opens]))
     found = improve_routes(late, empty_routes(1), SearchEffort(100), 0)
     back = late.home_s[0, 0] + late.turn_s[0, 0] * turn(
-        late.uas["position_m"][0], late.waypoints_m[0, :2], late.uas["start_m"][0]
+        late.uas["position_m"][0], late.waypoints_m[0, :2], late.uas["home_m"][0]
     )
     assert found.seconds[0] == pytest.approx(opens + back, abs=0.2)
 
@@ -336,7 +336,7 @@ def test_a_uas_whose_beginning_is_empty_flies_to_its_rest_at_once():
         legs_s = sum(whole.between_s[whole.uas["kind"][u], a, b] for a, b in pairwise(rest))
         there_s = whole.first_s[u, rest[0]] + legs_s + whole.home_s[u, rest[-1]]
         assert seconds[u] == pytest.approx(there_s)
-    ends_m = [part.problem.uas["start_m"][u].tolist() for u in range(2)]
+    ends_m = [part.problem.uas["home_m"][u].tolist() for u in range(2)]
     assert ends_m == [whole.waypoints_m[w, :2].tolist() for w in (2, 9)], "turns are towards it"
 
 

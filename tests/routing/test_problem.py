@@ -78,7 +78,7 @@ def test_a_route_begins_where_its_uas_is_as_it_flies_and_ends_where_it_takes_off
     uas = seen(town, swarm=under_way).uas
     np.testing.assert_array_equal(uas["position_m"], under_way.x[:, :2])
     np.testing.assert_array_equal(uas["velocity_mps"], [(3.0, -4.0), (0.0, 2.0)])
-    np.testing.assert_array_equal(uas["start_m"], [one.start_m[:2] for one in town.uas])
+    np.testing.assert_array_equal(uas["home_m"], [one.start_m[:2] for one in town.uas])
 
 
 def test_one_that_does_not_work_may_not_fly_and_takes_no_time(town):

@@ -30,7 +30,7 @@ def at_home(seed, waypoints, uas, budget_s):
     return made.replace(
         first_s=first_s,
         idle_s=np.zeros(uas),
-        position_m=made.uas["start_m"],
+        position_m=made.uas["home_m"],
         velocity_mps=np.zeros((uas, 2)),
         budget_s=np.full(uas, float(budget_s)),
     )
@@ -103,7 +103,7 @@ def two_fields(budget_s):
         home_s=away[None] / 10.0 + 4.0,
         between_s=apart[None] / 10.0,
         position_m=np.zeros((1, 2)),
-        start_m=np.zeros((1, 2)),
+        home_m=np.zeros((1, 2)),
         turn_s=np.zeros((1, 6)),
         neighbours=np.argsort(apart, axis=1, kind="stable")[:, 1:],
     )
@@ -244,7 +244,7 @@ def test_where_each_far_waypoint_takes_a_pack_of_its_own_so_many_packs_are_plann
         between_s=apart_m[None] / 10.0,
         speed_mps=10.0,
         position_m=np.zeros((1, 2)),
-        start_m=np.zeros((1, 2)),
+        home_m=np.zeros((1, 2)),
         turn_s=np.zeros((1, 6)),
         neighbours=np.argsort(apart_m, axis=1, kind="stable")[:, 1:],
     )

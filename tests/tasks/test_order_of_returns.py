@@ -6,7 +6,7 @@ from uas_coverage_env import GoTo, Velocity
 from uas_coverage_env.tasks import LEVELS, score
 from uas_coverage_env.vehicle.layout import Z
 
-_MISSIONS = {"easy": 4, "medium": 3, "hard": 4, "extreme": 2, "air-taxi": 2}
+_MISSIONS = {"easy": 4, "medium": 3, "hard": 4, "extreme": 2, "air-taxi": 2, "indoor": 2}
 
 
 class Hover:

@@ -44,7 +44,7 @@ _NUMBERS = (
 _OF_A_TOUR = ("aims_m", "radius_m", "onward_s")
 _FORM = (
     *("physical_sides", "limit_sides", "obstacle_sides", "waypoint_sides"),
-    *("outer_limits", "order", "corners_of_all", "prune"),
+    *("outer_limits", "order", "corners_of_all", "prune", "planar"),
 )
 
 
