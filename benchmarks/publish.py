@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import shlex
 import shutil
 import subprocess
@@ -132,7 +131,7 @@ class Checkout:
         if self.flown(name, command):
             return True
         sys.stderr.write(f"{name}: some {figures.minutes:g} minutes; {self.out / name}.log\n")
-        began_s, used_s = time.monotonic(), _used_s()
+        began_s = time.monotonic()
         code = self.run(command, self.out / f"{name}.txt")
         if code:
             sys.stderr.write(f"error: {name}: ended with {code}; see {self.out / name}.log\n")
@@ -140,7 +139,6 @@ class Checkout:
         done = {
             "command": command,
             "minutes": round((time.monotonic() - began_s) / 60.0, 1),
-            "processor_minutes": round((_used_s() - used_s) / 60.0, 1),
             "finished_at": datetime.now(UTC).isoformat(timespec="seconds"),
         }
         write_atomically(self.out / f"{name}.json", json.dumps(done, indent=2).encode())
@@ -294,11 +292,6 @@ def _git(folder: Path, *words: str) -> str:
     if run.returncode:
         raise InputError(f"git {words[0]}: {run.stderr.strip() or 'failed'}")
     return run.stdout.rstrip()
-
-
-def _used_s() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 if __name__ == "__main__":
