@@ -6,17 +6,20 @@
     python benchmarks/publish.py --out part --only test,karhula
 
 `published.toml` has the commands. They run in `--out`/checkout, a clone of the commit that is
-checked out, so that one may go on working; the same command goes on where it was stopped. When all
-is flown the pages are filled there, and they and `docs/published.json` (each table with its
-command, and the commit, versions and machine) are copied here; with `--quick` or `--only` nothing
-is copied. What a command says and no table has is in `--out`/NAME.txt, and the lines of pages which
-name that command are listed to be read.
+checked out, so that one may go on working. What a command has made is put on the pages at once, and
+into `docs/published.json`: each table with its command, and the commit, versions and machine.
+Commit both now and then: **what that file has is not flown again**, and the rest is flown from its
+commit, in another session, from another clone, on another machine. `--anew` begins again, from the
+commit that is checked out. `--quick` fills pages and file in `--out`/checkout alone. What a command
+says and no table has is in the file, too, and the lines of pages which name that command are listed
+to be read.
 
 Exits 1 where a command failed, 2 where the input is bad, 130 where it was stopped.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shlex
@@ -28,10 +31,11 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from threading import Lock
+from typing import Annotated, Any
 
 import typer
-from marks import ROOT, filled, pages, places
+from marks import ROOT, filled, marks_on, pages, places
 from pydantic import Field
 
 from uas_coverage_env.files.errors import InputError
@@ -52,7 +56,7 @@ class Figures(StrictModel):
     command: str
     """`{out}` is a folder of its own, `{jobs}` the processes side by side (else it uses one)."""
     minutes: float = Field(gt=0.0)
-    """On two quiet cores."""
+    """On quiet cores: two where it has `{jobs}`, else one."""
     quick: str = ""
     """The command of `--quick`; default: the same."""
     fill: tuple[str, ...] = ()
@@ -63,7 +67,15 @@ class Figures(StrictModel):
     alone: bool = False
     """It measures time: nothing else runs beside it."""
     gpu: bool = False
-    """It needs one: without, the page keeps what it has, with its machine and date."""
+    """It needs one: it is made where `--only` names it, else the page keeps what it has."""
+
+    def source(self, quick: bool) -> str:
+        """The command as it is written down, with its placeholders."""
+        return (self.quick or self.command) if quick else self.command
+
+    def on_two_cores(self) -> float:
+        """What two cores take, with others beside it [min]."""
+        return self.minutes / (1 if self.alone or "{jobs}" in self.command else 2)
 
 
 class Published(StrictModel):
@@ -81,27 +93,103 @@ def figures_in(path: Path = FIGURES) -> dict[str, Figures]:
     return read_toml(path, Published).figures
 
 
-class Checkout:
-    """A clone of one commit, in which everything runs, and what came of it."""
+class Results:
+    """What was made of one commit, in a file: it is read where it is there.
 
-    def __init__(self, out: Path, source: Path) -> None:
-        """Make the clone, or find it.
+    Args:
+        root: Of the project whose pages and `docs/published.json` it fills.
+        quick: Whether fewer missions are flown.
+    """
+
+    def __init__(self, root: Path, quick: bool) -> None:
+        self.root, self.quick = root, quick
+        self.path = root / RESULTS
+        self.kept: dict[str, Any] = {"commit": "", "quick": quick, "files": {}, "figures": {}}
+        if self.path.exists():
+            self.kept = json.loads(self.path.read_text("utf-8"))
+
+    def has(self, name: str, figures: Figures) -> bool:
+        """Whether some figures are there, by the command that is asked for now."""
+        source = self.kept["figures"].get(name, {}).get("source")
+        return source == figures.source(self.quick)
+
+    def add(self, name: str, made: dict[str, Any], files: dict[str, bytes]) -> None:
+        """Put figures on the pages and into the file.
+
+        Args:
+            name: Of the figures.
+            made: What is kept of them; `tables` go to the pages.
+            files: Other files that they made, by their names in the project.
 
         Raises:
-            InputError: What is to be flown is not committed.
+            InputError: A page lacks a mark.
         """
-        self.out = out.resolve()
+        for where, text in made["tables"].items():
+            page, _, mark = where.partition(": ")
+            _put(self.root / page, mark, text)
+        for path, content in files.items():
+            (self.root / path).parent.mkdir(parents=True, exist_ok=True)
+            (self.root / path).write_bytes(content)
+            self.kept["files"][path] = hashlib.sha256(content).hexdigest()
+        self.kept["figures"][name] = made
+        self.kept["figures"] = dict(sorted(self.kept["figures"].items()))
+        text = json.dumps(self.kept, indent=1, ensure_ascii=False)
+        write_atomically(self.path, f"{text}\n".encode())
+
+
+class Checkout:
+    """A clone of one commit, in which everything runs, and what came of it.
+
+    Args:
+        out: Where it is, beside what is flown.
+        source: What is cloned, at the commit of `docs/published.json` or, without, its own.
+        quick: Fly fewer missions.
+        jobs: Processes side by side.
+        anew: Leave aside what `docs/published.json` has.
+
+    Raises:
+        InputError: What is to be flown is not committed, or `out` has another commit.
+    """
+
+    def __init__(self, out: Path, source: Path, quick: bool, jobs: int, anew: bool = False) -> None:
+        self.out, self.quick, self.jobs = out.resolve(), quick, jobs
         self.folder = self.out / "checkout"
+        wanted = "" if quick or anew else Results(source, quick).kept["commit"]
+        if anew and self.folder.exists():
+            raise InputError(f"--anew: {out} has flights of a commit; name another folder")
         if not self.folder.exists():
-            changed = _git(source, "status", "--porcelain", "--untracked-files=no")
-            if changed:
-                raise InputError(
-                    f"{changed.split()[1]}: is changed; commit it, since only what is committed "
-                    "is flown"
-                )
-            self.out.mkdir(parents=True, exist_ok=True)
-            _git(source, "clone", "--quiet", "--no-hardlinks", str(source), str(self.folder))
+            self._clone(source, wanted)
         self.commit = _git(self.folder, "rev-parse", "HEAD")
+        if wanted and wanted != self.commit:
+            raise InputError(
+                f"--out: {out} has flights of {self.commit[:8]}, and {RESULTS.as_posix()} of "
+                f"{wanted[:8]}; name another folder"
+            )
+        self.results = Results(self.folder if quick else source, quick)
+        if self.results.kept["commit"] != self.commit:
+            self.results.kept = {"commit": self.commit, "quick": quick, "files": {}, "figures": {}}
+        for name in self.results.kept["files"]:
+            if not quick:  # what later figures add to
+                shutil.copyfile(source / name, self.folder / name)
+        self._one_at_a_time = Lock()
+
+    def _clone(self, source: Path, commit: str) -> None:
+        known = commit and _is_known(source, commit)
+        if commit and not known:
+            raise InputError(
+                f"{RESULTS.as_posix()}: is of {commit[:8]}, which is not in the history of what is "
+                "checked out; fetch all of it, or begin again with --anew"
+            )
+        changed = _git(source, "status", "--porcelain", "--untracked-files=no")
+        if changed and not commit:
+            raise InputError(
+                f"{changed.split()[1]}: is changed; commit it, since only what is committed is "
+                "flown"
+            )
+        self.out.mkdir(parents=True, exist_ok=True)
+        _git(source, "clone", "--quiet", "--no-hardlinks", str(source), str(self.folder))
+        if commit:
+            _git(self.folder, "checkout", "--quiet", commit)
 
     def run(self, command: str, log: Path) -> int:
         """Run a command in `out`, by this checkout; its exit code. Its outputs go to files."""
@@ -125,64 +213,61 @@ class Checkout:
                 check=False,
             ).returncode
 
-    def fly(self, name: str, figures: Figures, quick: bool, jobs: int) -> bool:
-        """Make some figures, if they are not there; whether they are there now."""
-        command = self.command(name, figures, quick, jobs)
-        if self.flown(name, command):
+    def make(self, name: str, figures: Figures) -> bool:
+        """Make some figures and publish them, if they are not there; whether they are there now."""
+        if self.results.has(name, figures):
             return True
+        if not self._flown(name, figures) and not self._fly(name, figures):
+            return False
+        try:
+            with self._one_at_a_time:
+                self._publish(name, figures)
+        except InputError as error:
+            sys.stderr.write(f"error: {error}\n")
+            return False
+        return True
+
+    def _fly(self, name: str, figures: Figures) -> bool:
         sys.stderr.write(f"{name}: some {figures.minutes:g} minutes; {self.out / name}.log\n")
         began_s = time.monotonic()
+        command = self._command(name, figures)
         code = self.run(command, self.out / f"{name}.txt")
         if code:
             sys.stderr.write(f"error: {name}: ended with {code}; see {self.out / name}.log\n")
             return False
         done = {
+            "source": figures.source(self.quick),
             "command": command,
             "minutes": round((time.monotonic() - began_s) / 60.0, 1),
             "finished_at": datetime.now(UTC).isoformat(timespec="seconds"),
-        }
-        write_atomically(self.out / f"{name}.json", json.dumps(done, indent=2).encode())
-        sys.stderr.write(f"{name}: took {done['minutes']:.0f} minutes\n")
-        return True
-
-    @staticmethod
-    def command(name: str, figures: Figures, quick: bool, jobs: int) -> str:
-        """The command that makes some figures here."""
-        command = (figures.quick or figures.command) if quick else figures.command
-        return command.format(out=name, jobs=jobs)
-
-    def flown(self, name: str, command: str) -> bool:
-        """Whether a command has ended well in this checkout."""
-        path = self.out / f"{name}.json"
-        return path.exists() and json.loads(path.read_text("utf-8"))["command"] == command
-
-    def fill(self, flown: dict[str, Figures], quick: bool) -> None:
-        """Fill the pages of the checkout, and write the file of results.
-
-        Raises:
-            InputError: A page cannot be filled.
-        """
-        tables = {}
-        for name, figures in flown.items():
-            done = json.loads((self.out / f"{name}.json").read_text("utf-8"))
-            for page, mark, _ in self._places(figures):
-                _put(page, mark, _EMPTY)
-            self._fill(name, figures, done["command"])
-            for page, mark, text in self._places(figures):
-                if text == _EMPTY:
-                    raise InputError(f"{name}: has not filled <!-- {mark} --> of {page.name}")
-                where = f"{page.relative_to(self.folder).as_posix()}: {mark}"
-                tables[where] = {"figures": name, **done, "text": text}
-        results = {
-            "commit": self.commit,
-            "quick": quick,
             "versions": versions(),
             "machine": machine(),
-            "tables": tables,
         }
-        path = self.folder / RESULTS
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", "utf-8")
+        write_atomically(self.out / f"{name}.json", json.dumps(done, indent=2).encode())
+        sys.stderr.write(f"{name}: took {done['minutes']:.1f} minutes\n")
+        return True
+
+    def _command(self, name: str, figures: Figures) -> str:
+        return figures.source(self.quick).format(out=name, jobs=self.jobs)
+
+    def _flown(self, name: str, figures: Figures) -> bool:
+        path = self.out / f"{name}.json"
+        if not path.exists():
+            return False
+        return json.loads(path.read_text("utf-8"))["source"] == figures.source(self.quick)
+
+    def _publish(self, name: str, figures: Figures) -> None:
+        done = json.loads((self.out / f"{name}.json").read_text("utf-8"))
+        tables = {}
+        for page, mark, _ in self._places(figures):
+            _put(page, mark, _EMPTY)
+        self._fill(name, figures, done["command"])
+        for page, mark, text in self._places(figures):
+            if text == _EMPTY:
+                raise InputError(f"{name}: has not filled <!-- {mark} --> of {page.name}")
+            tables[f"{page.relative_to(self.folder).as_posix()}: {mark}"] = text
+        text = "" if tables else (self.out / f"{name}.txt").read_text("utf-8").strip()
+        self.results.add(name, {**done, "tables": tables, "text": text}, self._other_files())
 
     def _places(self, figures: Figures) -> list[tuple[Path, str, str]]:
         return [place for place in places(self.folder) if place[1] in figures.marks]
@@ -198,35 +283,35 @@ class Checkout:
             for page, mark, _ in self._places(figures):
                 _put(page, mark, f"`{command}`\n\n{written.strip()}")
 
-    def copy_to(self, root: Path) -> list[str]:
-        """Copy what was filled; the files."""
+    def _other_files(self) -> dict[str, bytes]:
+        """What has changed in the checkout, but for tables between marks."""
         lines = _git(self.folder, "status", "--porcelain", "--untracked-files=all").splitlines()
-        names = [line.strip().split(maxsplit=1)[1] for line in lines]
-        for name in names:
-            (root / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(self.folder / name, root / name)
-        return names
+        paths = [self.folder / line.strip().split(maxsplit=1)[1] for line in lines]
+        filled_in = {page for page in pages(self.folder) if marks_on(page.read_text("utf-8"))}
+        return {
+            path.relative_to(self.folder).as_posix(): path.read_bytes()
+            for path in paths
+            if path not in filled_in and path != self.folder / RESULTS
+        }
 
 
-def fly_all(
-    checkout: Checkout, wanted: dict[str, Figures], quick: bool, jobs: int
-) -> dict[str, Figures]:
+def make_all(checkout: Checkout, wanted: dict[str, Figures]) -> dict[str, Figures]:
     """Make all figures that are asked for; those that are there."""
 
-    def fly(name: str) -> bool:
-        return checkout.fly(name, wanted[name], quick, jobs)
+    def make(name: str) -> bool:
+        return checkout.make(name, wanted[name])
 
     def chosen(is_of: Callable[[Figures], bool]) -> list[str]:
         return [name for name, figures in wanted.items() if is_of(figures)]
 
     there = {}
     for name in chosen(lambda one: not one.alone and "{jobs}" in one.command):
-        there[name] = fly(name)
+        there[name] = make(name)
     one_core = chosen(lambda one: not one.alone and "{jobs}" not in one.command)
-    with ThreadPoolExecutor(jobs) as pool:
-        there |= dict(zip(one_core, pool.map(fly, one_core), strict=True))
+    with ThreadPoolExecutor(checkout.jobs) as pool:
+        there |= dict(zip(one_core, pool.map(make, one_core), strict=True))
     for name in chosen(lambda one: one.alone):
-        there[name] = fly(name)
+        there[name] = make(name)
     return {name: figures for name, figures in wanted.items() if there[name]}
 
 
@@ -249,37 +334,54 @@ def main(
     only: Annotated[str, typer.Option(help="Some figures, by name.")] = "",
     quick: Annotated[bool, typer.Option("--quick", help="Fewer missions and seeds.")] = False,
     jobs: Annotated[int, typer.Option(min=1, help="Processes side by side.")] = 2,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="Fly what docs/published.json has, too.")
+    ] = False,
     listed: Annotated[bool, typer.Option("--list", help="Only say what there is.")] = False,
 ) -> None:
-    """Fly, fill and copy."""
+    """Fly and publish."""
     wanted = figures_in()
     for name in filter(None, only.split(",")):
         check_choice("--only", name, wanted)
     if only:
         wanted = {name: wanted[name] for name in only.split(",")}
+    else:
+        wanted = {name: one for name, one in wanted.items() if not one.gpu}
     if listed:
+        there = Results(ROOT, quick=False)
         for name, one in wanted.items():
-            sys.stdout.write(f"{one.minutes:6g} min  {name:24} {one.command}\n")
-        total = sum(one.minutes / (1 if one.alone or "{jobs}" in one.command else 2)
-                    for one in wanted.values())  # fmt: skip
-        sys.stdout.write(f"{total / 60.0:6.1f} h    all, on two quiet cores\n")
+            done = "there" if there.has(name, one) else ""
+            sys.stdout.write(f"{one.minutes:6g} min  {done:6}{name:24} {one.command}\n")
+        for what, some in (
+            ("all", wanted.values()),
+            ("left", [one for name, one in wanted.items() if not there.has(name, one)]),
+        ):
+            hours = sum(one.on_two_cores() for one in some) / 60.0
+            sys.stdout.write(f"{hours:6.1f} h    {what}, on two quiet cores\n")
         return
     if out is None:
         raise InputError("--out: is missing; name a folder")
-    checkout = Checkout(out, ROOT)
-    there = fly_all(checkout, wanted, quick, jobs)
-    if len(there) < len(wanted):
-        raise typer.Exit(1)
-    checkout.fill(there, quick)
-    copied = [] if quick or only else checkout.copy_to(ROOT)
-    for name in copied or [f"{checkout.folder / RESULTS}"]:
-        sys.stdout.write(f"{name}\n")
+    checkout = Checkout(out, ROOT, quick, jobs, anew)
+    there = make_all(checkout, wanted)
+    sys.stdout.write(f"{checkout.results.path}\n")
     for line in lines_that_name(there.values(), ROOT):
         sys.stdout.write(f"to be read: {line}\n")
+    if len(there) < len(wanted):
+        raise typer.Exit(1)
 
 
 def _put(page: Path, mark: str, content: str) -> None:
-    page.write_text(filled(page.read_text("utf-8"), content, mark), encoding="utf-8")
+    try:
+        text = filled(page.read_text("utf-8"), content, mark)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{page.name}: {error}") from error
+    page.write_text(text, encoding="utf-8")
+
+
+def _is_known(folder: Path, commit: str) -> bool:
+    """Whether a commit is in the history of what is checked out."""
+    words = ["git", "-C", str(folder), "merge-base", "--is-ancestor", commit, "HEAD"]
+    return subprocess.run(words, check=False, capture_output=True).returncode == 0
 
 
 def _git(folder: Path, *words: str) -> str:
