@@ -191,8 +191,12 @@ class Checkout:
         if commit:
             _git(self.folder, "checkout", "--quiet", commit)
 
-    def run(self, command: str, log: Path) -> int:
-        """Run a command in `out`, by this checkout; its exit code. Its outputs go to files."""
+    def run(self, command: str, log: Path) -> tuple[int, float | None]:
+        """Run a command in `out`, by this checkout. Its outputs go to files.
+
+        Returns:
+            Its exit code, and the processor time it took [s], where the system tells.
+        """
         rooms = (self.folder, *(self.folder / room for room in ("baselines", "agents")))
         environment = os.environ | {
             "PYTHONPATH": os.pathsep.join(map(str, rooms)),
@@ -204,14 +208,18 @@ class Checkout:
         else:
             words[:0] = ["-m", "uas_coverage_env"]
         with log.open("wb") as stdout, log.with_suffix(".log").open("ab") as stderr:
-            return subprocess.run(
+            with subprocess.Popen(
                 [sys.executable, *words],
                 cwd=self.out,
                 env=environment,
                 stdout=stdout,
                 stderr=stderr,
-                check=False,
-            ).returncode
+            ) as process:
+                if not hasattr(os, "wait4"):  # Windows
+                    return process.wait(), None
+                _, status, spent = os.wait4(process.pid, 0)
+                process.returncode = os.waitstatus_to_exitcode(status)
+        return process.returncode, spent.ru_utime + spent.ru_stime
 
     def make(self, name: str, figures: Figures) -> bool:
         """Make some figures and publish them, if they are not there; whether they are there now."""
@@ -231,7 +239,7 @@ class Checkout:
         sys.stderr.write(f"{name}: some {figures.minutes:g} minutes; {self.out / name}.log\n")
         began_s = time.monotonic()
         command = self._command(name, figures)
-        code = self.run(command, self.out / f"{name}.txt")
+        code, spent_s = self.run(command, self.out / f"{name}.txt")
         if code:
             sys.stderr.write(f"error: {name}: ended with {code}; see {self.out / name}.log\n")
             return False
@@ -239,12 +247,15 @@ class Checkout:
             "source": figures.source(self.quick),
             "command": command,
             "minutes": round((time.monotonic() - began_s) / 60.0, 1),
+            "processor_minutes": None if spent_s is None else round(spent_s / 60.0, 2),
             "finished_at": datetime.now(UTC).isoformat(timespec="seconds"),
             "versions": versions(),
             "machine": machine(),
         }
         write_atomically(self.out / f"{name}.json", json.dumps(done, indent=2).encode())
-        sys.stderr.write(f"{name}: took {done['minutes']:.1f} minutes\n")
+        sys.stderr.write(
+            f"{name}: took {done['minutes']} minutes, {done['processor_minutes']} of a processor\n"
+        )
         return True
 
     def _command(self, name: str, figures: Figures) -> str:
@@ -276,7 +287,7 @@ class Checkout:
         log = self.out / f"{name}.fill.txt"
         for fill in figures.fill:
             words = fill.format(out=name, command=command, checkout=self.folder)
-            if self.run(words, log):
+            if self.run(words, log)[0]:
                 raise InputError(f"{name}: `{words}` failed; see {log.with_suffix('.log')}")
         if not figures.fill:
             written = (self.out / f"{name}.txt").read_text("utf-8")
