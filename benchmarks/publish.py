@@ -207,18 +207,21 @@ class Checkout:
             words[0] = str(self.folder / words[0])
         else:
             words[:0] = ["-m", "uas_coverage_env"]
-        with log.open("wb") as stdout, log.with_suffix(".log").open("ab") as stderr:
-            with subprocess.Popen(
+        with (
+            log.open("wb") as stdout,
+            log.with_suffix(".log").open("ab") as stderr,
+            subprocess.Popen(
                 [sys.executable, *words],
                 cwd=self.out,
                 env=environment,
                 stdout=stdout,
                 stderr=stderr,
-            ) as process:
-                if not hasattr(os, "wait4"):  # Windows
-                    return process.wait(), None
-                _, status, spent = os.wait4(process.pid, 0)
-                process.returncode = os.waitstatus_to_exitcode(status)
+            ) as process,
+        ):
+            if not hasattr(os, "wait4"):  # Windows
+                return process.wait(), None
+            _, status, spent = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
         return process.returncode, spent.ru_utime + spent.ru_stime
 
     def make(self, name: str, figures: Figures) -> bool:
