@@ -1,4 +1,4 @@
-"""Make the pictures of the gallery: python docs/gallery.py.
+"""Make the pictures of scenarios, planners and replay pages: python docs/gallery.py.
 
 Flies the planners that take less than a minute, and opens replay pages in headless Chromium. Needs
 Chromium, its driver (Debian: `chromium`, `chromium-driver`) and the extra `test`.
