@@ -236,6 +236,19 @@ def test_what_is_no_block_is_refused_at_once(wrong):
         MilpMpc(blocks=(*OCP, wrong))
 
 
+class TakesLess:
+    """Adds nothing, and lacks two arguments."""
+
+    def add_to(self, milp): ...
+
+
+def test_a_block_that_cannot_be_called_is_refused_with_its_file_and_line():
+    line = TakesLess.add_to.__code__.co_firstlineno
+    where = rf"called with \(milp, variables, problem\): .*test_added_blocks\.py:{line}\)"
+    with pytest.raises(InputError, match=where):
+        MilpMpc(blocks=(*OCP, TakesLess()))
+
+
 @pytest.mark.parametrize(
     ("names", "height_m"),
     [("added_blocks:Ceiling", 14.0), ("added_blocks:LOW", 9.0), ("added_blocks:made", 10.0)],

@@ -1,12 +1,14 @@
 """Blocks from outside the package: by the name of an entry point, or as MODULE:CLASS."""
 
+from inspect import signature
+from types import FunctionType
 from typing import Any
 
 from uas_coverage_baselines.milp_mpc.model.ocp import Block
 from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.plugins.installed import entry_points
 from uas_coverage_env.plugins.named_objects import object_named
-from uas_coverage_env.plugins.users_code import described
+from uas_coverage_env.plugins.users_code import described, place_of_function
 
 GROUP = "uas_coverage.blocks"
 """The entry-point group in which packages announce blocks by name."""
@@ -41,12 +43,21 @@ def checked(block: Any, name: str = "") -> Block:
     """The block, if it is one.
 
     Raises:
-        InputError: it is a class, or has no method `add_to`.
+        InputError: it is a class, or has no method `add_to` that takes what it is given.
     """
     if isinstance(block, type) or not callable(getattr(block, "add_to", None)):
         raise InputError(
             f"block {name or block!r} is no object with a method add_to(milp, variables, problem)"
         )
+    try:
+        signature(block.add_to).bind(None, None, None)
+    except TypeError as error:
+        function = getattr(block.add_to, "__func__", None)
+        place = place_of_function(function) if isinstance(function, FunctionType) else ""
+        raise InputError(
+            f"block {name or block!r}: add_to is called with (milp, variables, problem): "
+            f"{error}{place}"
+        ) from error
     return block
 
 
