@@ -20,6 +20,38 @@ def pages(root: Path = ROOT) -> list[Path]:
     return [page for page in (*readmes, *sorted((root / "docs").glob("*.md"))) if page.exists()]
 
 
+_ROW = re.compile(r"\s*[│┃](.*)[│┃]\s*")
+_RULE = re.compile(r"\s*[┏┡├└][┳┓╇┩┼┤┴┘━─]*\s*")
+_NUMBER = re.compile(r"[-+≤<>]?\s*\d")
+
+
+def markdown(printed: str) -> str:
+    """What a command has printed, with Markdown in place of the tables that Rich drew.
+
+    Their titles stay above them as lines of their own.
+    """
+    lines: list[str] = []
+    rows: list[list[str]] = []
+    for line in printed.splitlines():
+        if row := _ROW.fullmatch(line):
+            rows.append([cell.strip() for cell in re.split("[│┃]", row[1])])
+        elif not _RULE.fullmatch(line):
+            lines.append(line.strip())
+        elif line.lstrip().startswith("└"):
+            lines += ["", *_table(rows), ""]
+            rows = []
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip()
+
+
+def _table(rows: list[list[str]]) -> list[str]:
+    head, *rest = rows
+    numbers = [
+        all(_NUMBER.match(cell) for cell in column if cell) for column in zip(*rest, strict=True)
+    ]
+    rule = "|".join(" ---: " if number else " --- " for number in numbers)
+    return [f"| {' | '.join(head)} |", f"|{rule}|", *(f"| {' | '.join(row)} |" for row in rest)]
+
+
 def marks_of(mark: str) -> tuple[str, str]:
     """The lines before and after what is filled in."""
     return f"<!-- {mark} -->\n", f"<!-- end of {mark} -->"

@@ -156,6 +156,7 @@ def main(
     option: Annotated[list[str] | None, typer.Option(help="NAME=VALUE of the planner.")] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Stop after so many.")] = None,
     page: Annotated[Path | None, typer.Option(help="Page whose marks are filled.")] = None,
+    mark: Annotated[str, typer.Option(help="Which; default: of the mission.")] = "",
     every: Annotated[int, typer.Option(min=1, help="Decisions per line of the page.")] = 1,
 ) -> None:
     """Fly a mission with `milp-mpc-paper` and tell every decision."""
@@ -208,8 +209,12 @@ def main(
     console.print(summary, highlight=False)
     if page is not None:
         text = f"{summary}\n\n{table if every == 1 else short_table_of(rows, every)}\n"
-        mark = MARK.format(mission=mission)
-        page.write_text(filled(page.read_text(encoding="utf-8"), text, mark), encoding="utf-8")
+        where = MARK.format(mission=mark or mission)
+        try:
+            text = filled(page.read_text(encoding="utf-8"), text, where)
+        except ValueError as error:
+            raise InputError(f"{page} {error}") from error
+        page.write_text(text, encoding="utf-8")
     if not accomplished(flight) or any(decision.fallback for decision in flight.decisions):
         raise typer.Exit(1)
 

@@ -35,7 +35,7 @@ from threading import Lock
 from typing import Annotated, Any
 
 import typer
-from marks import ROOT, filled, marks_on, pages, places
+from marks import ROOT, filled, markdown, marks_on, pages, places
 from pydantic import Field
 
 from uas_coverage_env.files.errors import InputError
@@ -66,8 +66,9 @@ class Figures(StrictModel):
     """Between which it stands on pages."""
     alone: bool = False
     """It measures time: nothing else runs beside it."""
-    gpu: bool = False
-    """It needs one: it is made where `--only` names it, else the page keeps what it has."""
+    elsewhere: bool = False
+    """It needs what not every machine has: a GPU, libraries of others, another release. It is made
+    where `--only` names it; else the page keeps what it has, and says where that was."""
 
     def source(self, quick: bool) -> str:
         """The command as it is written down, with its placeholders."""
@@ -201,6 +202,7 @@ class Checkout:
         environment = os.environ | {
             "PYTHONPATH": os.pathsep.join(map(str, rooms)),
             "OMP_NUM_THREADS": "1",
+            "COLUMNS": "400",  # no cell of a table is broken
         }
         program, *words = shlex.split(command)
         if program == "python":
@@ -295,7 +297,7 @@ class Checkout:
         if not figures.fill:
             written = (self.out / f"{name}.txt").read_text("utf-8")
             for page, mark, _ in self._places(figures):
-                _put(page, mark, f"`{command}`\n\n{written.strip()}")
+                _put(page, mark, f"`{command}`\n\n{markdown(written)}")
 
     def _other_files(self) -> dict[str, bytes]:
         """What has changed in the checkout, but for tables between marks."""
@@ -360,7 +362,7 @@ def main(
     if only:
         wanted = {name: wanted[name] for name in only.split(",")}
     else:
-        wanted = {name: one for name, one in wanted.items() if not one.gpu}
+        wanted = {name: one for name, one in wanted.items() if not one.elsewhere}
     if listed:
         there = Results(ROOT, quick=False)
         for name, one in wanted.items():

@@ -5,16 +5,19 @@ import json
 import re
 import subprocess
 import sys
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
+from rich.table import Table
 
 from uas_coverage_env.files.errors import InputError
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 import publish
-from marks import filled, pages, places
+from marks import filled, markdown, pages, places
 
 SHALLOW = "the history is not here (a shallow clone)"
 BENCHMARK = re.compile(r"python benchmarks/([a-z_]+\.py)")
@@ -61,14 +64,14 @@ def faults_of(kept: dict, root: Path, stated: dict[str, publish.Figures]) -> lis
             faults.append(f"{name}: is not what was made")
     if kept["quick"]:
         faults.append("is of fewer missions")
-    wanted = {name for name, one in stated.items() if not one.gpu}
+    wanted = {name for name, one in stated.items() if not one.elsewhere}
     if wanted <= set(kept["figures"]):  # else it is being flown
         made = {where for one in kept["figures"].values() for where in one["tables"]}
-        by_gpu = {mark for one in stated.values() if one.gpu for mark in one.marks}
+        from_elsewhere = {mark for one in stated.values() if one.elsewhere for mark in one.marks}
         faults += [
             f"{where}: is of another state"
             for where in sorted(set(on_pages) - made)
-            if where.partition(": ")[2] not in by_gpu
+            if where.partition(": ")[2] not in from_elsewhere
         ]
     return faults
 
@@ -238,6 +241,21 @@ def test_anew_begins_again_from_the_commit_that_is_checked_out(project, tmp_path
     assert tables_of(kept) == {"README.md: first": "`python benchmarks/one.py`\n\nother"}
 
 
+def test_tables_that_are_drawn_on_a_terminal_are_tables_of_the_page():
+    table = Table("rule", "home", "share", title="Which")
+    table.add_row("fly", "95 %", "")
+    table.add_section()
+    table.add_row("wait", "none", "≤ 3 %")
+    console = Console(file=StringIO(), width=200)
+    console.print("on 5 missions", table, "the end")
+    assert markdown(console.file.getvalue()) == (
+        "on 5 missions\nWhich\n\n"
+        "| rule | home | share |\n| --- | --- | ---: |\n"
+        "| fly | 95 % |  |\n| wait | none | ≤ 3 % |\n\nthe end"
+    )
+    assert markdown(TABLE) == TABLE.strip()
+
+
 @pytest.mark.parametrize(
     ("edit", "fault"),
     [
@@ -305,10 +323,10 @@ def test_a_quick_run_leaves_the_pages_alone_and_goes_on_where_it_was(project, tm
     assert faults_of(kept, out / "checkout", publish.figures_in()) == ["is of fewer missions"]
 
 
-def test_figures_of_a_gpu_are_made_where_they_are_named(project, tmp_path, monkeypatch):
+def test_figures_of_another_machine_are_made_where_they_are_named(project, tmp_path, monkeypatch):
     figures = publish.figures_in()
-    on_gpu = figures["two"].model_copy(update={"gpu": True})
-    monkeypatch.setattr(publish, "figures_in", lambda: figures | {"two": on_gpu})
+    elsewhere = figures["two"].model_copy(update={"elsewhere": True})
+    monkeypatch.setattr(publish, "figures_in", lambda: figures | {"two": elsewhere})
     run(tmp_path / "out")
     assert set(results(project)["figures"]) == {"one"}
     assert faults_of(results(project), project, publish.figures_in()) == []
