@@ -60,8 +60,9 @@ def measured(kind: str, settings: dict[str, object], version: str, cache: str) -
 
 def main(version: str) -> None:
     """Print the table, row by row: a row takes minutes."""
-    row = "{:12} {:34} {:>9} {:>13} {:>9} {:>9}".format
+    row = "| {:12} | {:34} | {:>9} | {:>13} | {:>9} | {:>9} |".format
     print(row("environment", "settings", "first, s", "processor, s", "peak MB", "again, s"))
+    print("| --- | --- | ---: | ---: | ---: | ---: |")
     for kind in KINDS:
         for name, settings in SETTINGS.items():
             with tempfile.TemporaryDirectory() as cache:
