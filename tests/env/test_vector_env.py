@@ -331,6 +331,11 @@ def test_wrong_seeds_are_refused(seed):
         make().reset(seed=seed)
 
 
+def test_one_that_could_not_be_made_closes_without_a_word():
+    """Gymnasium closes what it collects, even where `__init__` has raised."""
+    CoverageVectorEnv.__new__(CoverageVectorEnv).close_extras()
+
+
 def test_it_closes_twice():
     env = make()
     env.reset()

@@ -335,7 +335,8 @@ class CoverageVectorEnv(Versioned, VectorEnv[Any, NDArray[Any], NDArray[Any]]):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""
-        self._tiles.close()
+        if hasattr(self, "_tiles"):  # else its making has failed, and Gymnasium closes it
+            self._tiles.close()
 
     def _shown(self, observation: NDArray[np.float32]) -> Any:
         seen = observation.reshape(self.num_envs, -1)
