@@ -8,6 +8,7 @@ import os
 import pickle
 import subprocess
 import sys
+import textwrap
 from dataclasses import fields
 from typing import Any
 
@@ -183,6 +184,16 @@ def test_docstrings_say_what_the_version_has():
     assert HURRY.name not in (CoverageParallelEnv.__doc__ or "").split()
     assert NextParallelEnv.metadata["name"] == "uas_coverage_v7"
     assert CoverageParallelEnv.metadata["name"] == "uas_coverage_v0"
+
+
+@pytest.mark.parametrize("margin", [0, 4])
+def test_tables_of_a_docstring_are_as_far_in_as_their_place(margin):
+    """Compilers strip the indentation of docstrings from Python 3.13 on."""
+    text = textwrap.indent("Head.\n\nInfos:\n    {infos}\n    - last", " " * margin)
+    made = type("Described", (CoverageParallelEnv,), {"__doc__": text})
+    entries = [line for line in str(made.__doc__).splitlines() if line.lstrip().startswith("- ")]
+    assert len(entries) > 5
+    assert {len(line) - len(line.lstrip()) for line in entries} == {margin + 4}
 
 
 def test_an_environment_of_a_version_can_be_pickled():

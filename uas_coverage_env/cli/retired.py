@@ -15,6 +15,8 @@ FOLLOWERS: Mapping[str, str] = {
     "vehicles": "vehicle list",
     "resume": "scenario resume",
     "import-log": "log",
+    "export --autopilot": "export --firmware",
+    "train --minutes": "train --steps",
     "score --players": "score --planners",
     "compare --players": "compare --planners",
 }

@@ -37,4 +37,7 @@ class Versioned:
         }
         cls.__doc__ = cls._described
         for place, table in tables.items():
-            cls.__doc__ = cls.__doc__.replace(place, table.replace("\n", "\n        "))
+            before, found, after = cls.__doc__.partition(place)
+            if found:  # as far in as its place is: from Python 3.13 on docstrings are not indented
+                indent = " " * (len(before) - len(before.rstrip(" ")))
+                cls.__doc__ = before + table.replace("\n", f"\n{indent}") + after
