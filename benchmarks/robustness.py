@@ -71,12 +71,12 @@ def make(
 ) -> dict[str, Store]:
     """Make what is missing of some rows; returns what there is of each."""
     stores = {row.name: Store(out, row.name) for row in rows}
-    work = [
-        (stores[row.name], trial)
-        for row in rows
-        for trial in row.trials(quick)
-        if trial.key not in stores[row.name].entries
-    ]
+    shares = []  # of each row the same share, wherever `minutes` end it
+    for row in rows:
+        trials = row.trials(quick)
+        shares += [(n / len(trials), stores[row.name], one) for n, one in enumerate(trials)]
+    shares.sort(key=lambda one: one[0])
+    work = [(store, one) for _, store, one in shares if one.key not in store.entries]
     until = float("inf") if minutes is None else time.monotonic() + 60.0 * minutes
     source = source_hash(_PACKAGES)[:12]
     for made, (store, trial, result) in enumerate(try_all(work, jobs, until), start=1):

@@ -30,10 +30,10 @@ OPTIONS: Mapping[str, Mapping[str, str]] = {
 
 # missions of each level: (quick, small of the full run, large of it)
 _MISSIONS = {
-    "tour": (6, 300, 30),
-    "trajectory": (4, 300, 10),
-    "learned-route": (1, 300, 10),
-    "milp-mpc": (1, 300, 1),
+    "tour": (6, 60, 10),
+    "trajectory": (4, 60, 10),
+    "learned-route": (1, 30, 5),
+    "milp-mpc": (1, 15, 1),
 }
 _OTHERS = (30, 300, 300)
 

@@ -1,5 +1,7 @@
 """The benchmark of reliability: what it keeps, what it makes again, and what its page says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import robustness
@@ -44,6 +46,17 @@ def test_what_was_made_is_kept_and_not_made_again(tmp_path):
 def test_after_its_minutes_no_trial_begins(tmp_path):
     stores = robustness.make([row_of([Trial("a", dict, ({},))])], True, 1, 0.0, tmp_path)
     assert not stores["R1"].entries
+
+
+def test_rows_are_made_side_by_side_so_that_an_end_leaves_each_the_same_share(tmp_path, capsys):
+    """Two trials of one row come between the halves of another."""
+    few = row_of([Trial(f"few {n}", dict, ({},)) for n in range(2)])
+    many = replace(row_of([Trial(f"many {n}", dict, ({},)) for n in range(4)]), name="R2")
+    robustness.make([few, many], True, 1, None, tmp_path)
+    made = [line.split(" ", 1)[1] for line in capsys.readouterr().err.splitlines()]
+    assert made == [
+        f"{key}: done" for key in ("few 0", "many 0", "many 1", "few 1", "many 2", "many 3")
+    ]
 
 
 def test_an_exception_is_a_result():
