@@ -5,11 +5,14 @@
     python benchmarks/put_table.py sweep light   in light wind; likewise moderate, strong,
                                                  nonlinear (the plant), karhula, searched (an
                                                  order for milp-mpc), horizon (its N)
+    python benchmarks/put_table.py sweep village its flights of the village, and "ten seeds":
+                                                 median and range of each planner's flights
 
 Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (`table.md`
 without what its columns mean, and without single scenarios) and of `README.md` (a short table),
 and copies the picture to `docs/pictures`; or a short table between the marks of another name
-(`<!-- test -->`) of `baselines/README.md`.
+(`<!-- test -->`) of `baselines/README.md`; `village` is on `README.md`, `ten seeds` on
+`docs/trajectory.md`.
 Exits 2 where a file or a mark is missing, or a file was damaged.
 """
 
@@ -18,16 +21,21 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from marks import ROOT, filled
 
 from uas_coverage_env.files.digits import three_digits
+from uas_coverage_env.files.errors import InputError
+from uas_coverage_env.leaderboard.row import Row
+from uas_coverage_env.runner.store import rows_in
 
 UNCERTAIN = ("light", "moderate", "strong", "nonlinear")  # where no flight is as the model has it
-MARKS = ("leaderboard", "test", "karhula", "searched", "horizon", *UNCERTAIN)
+OF_FLIGHTS = {"village": ROOT / "README.md", "ten seeds": ROOT / "docs" / "trajectory.md"}
+MARKS = ("leaderboard", "test", "karhula", "searched", "horizon", *UNCERTAIN, *OF_FLIGHTS)
 COLUMNS_EXPLAINED = "Interquartile means"
 PICTURE = ROOT / "docs" / "pictures" / "leaderboard.png"
 
@@ -52,6 +60,33 @@ def short_table(data: dict[str, Any], mark: str = "leaderboard") -> str:
         cells = [f"`{_label(one)}`", *(cell(one) for cell in columns.values())]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join([f"`{data['command']}`", "", *lines])
+
+
+def spread_table(rows: Sequence[Row], command: str) -> str:
+    """A row for each planner, least energy first: flights, accomplished, steps and energy.
+
+    Steps and energy are the median, and the range where there are several flights.
+    """
+    flown: dict[str, list[Row]] = {}
+    for one in rows:
+        flown.setdefault(one.label, []).append(one)
+    lines = ["| planner | accomplished | steps | energy, Wh |", "|---|---:|---:|---:|"]
+    by_energy = sorted(
+        flown.items(), key=lambda item: np.median([one.energy_Wh for one in item[1]])
+    )
+    for label, mine in by_energy:
+        steps = _spread([one.steps for one in mine], "g")
+        energy = _spread([one.energy_Wh for one in mine], ".2f")
+        done = sum(one.accomplished for one in mine)
+        lines.append(f"| `{label}` | {done} of {len(mine)} | {steps} | {energy} |")
+    return "\n".join([f"`{command}`", "", *lines])
+
+
+def _spread(values: Sequence[float], digits: str) -> str:
+    if len(values) == 1:
+        return f"{values[0]:{digits}}"
+    low, high = min(values), max(values)
+    return f"{np.median(values):{digits}} ({low:{digits}} to {high:{digits}})"
 
 
 _Columns = dict[str, Callable[[dict[str, Any]], str]]
@@ -98,8 +133,8 @@ def main(folder: str, mark: str = "leaderboard") -> int:
     """Fill the files; the exit code."""
     sweep = Path(folder)
     try:
-        short = _short(sweep, mark)
-        contents = {ROOT / "baselines" / "README.md": short}
+        short = _of_flights(sweep, mark) if mark in OF_FLIGHTS else _short(sweep, mark)
+        contents = {OF_FLIGHTS.get(mark, ROOT / "baselines" / "README.md"): short}
         if mark == "leaderboard":
             long = _long((sweep / "table.md").read_text(encoding="utf-8"))
             contents = {ROOT / "README.md": short, ROOT / "baselines" / "README.md": long}
@@ -113,7 +148,7 @@ def main(folder: str, mark: str = "leaderboard") -> int:
             path.write_text(text, encoding="utf-8", newline="")
         if mark == "leaderboard":
             shutil.copyfile(sweep / "coverage-energy.png", PICTURE)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, InputError) as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
     return 0
@@ -122,6 +157,14 @@ def main(folder: str, mark: str = "leaderboard") -> int:
 def _long(table: str) -> str:
     """The table up to the words on its columns, which `docs/leaderboard.md` explains."""
     return table.partition(f"\n{COLUMNS_EXPLAINED}")[0]
+
+
+def _of_flights(sweep: Path, mark: str) -> str:
+    data = json.loads((sweep / "table.json").read_text(encoding="utf-8"))
+    rows = [one for one in rows_in(sweep, Row) if one.scenario == "village"]
+    if not rows:
+        raise ValueError(f"{sweep}: has no flight of the village")
+    return spread_table(rows, data["command"])
 
 
 def _short(sweep: Path, mark: str) -> str:

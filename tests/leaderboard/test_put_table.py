@@ -3,6 +3,7 @@
 import importlib.util
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from leaderboard_rows import failed_row, row
@@ -104,3 +105,17 @@ def test_a_damaged_table_is_named_and_changes_nothing(put_table, tmp_path, capsy
     assert put_table.main(str(sweep)) == 2
     assert "table.json: was damaged" in capsys.readouterr().err
     assert (tmp_path / "README.md").read_text() == before
+
+
+def test_flights_of_a_planner_are_a_median_and_a_range_and_one_flight_is_itself(put_table):
+    flights = [("far", 9, 4.0, False), ("near", 7, 3.0, True), ("near", 8, 1.0, True)]
+    rows = [
+        SimpleNamespace(label=label, steps=steps, energy_Wh=energy_Wh, accomplished=accomplished)
+        for label, steps, energy_Wh, accomplished in [*flights, ("near", 20, 2.0, True)]
+    ]
+    lines = put_table.spread_table(rows, "compare").splitlines()
+    assert lines[0] == "`compare`"
+    assert lines[-2:] == [
+        "| `near` | 3 of 3 | 8 (7 to 20) | 2.00 (1.00 to 3.00) |",
+        "| `far` | 0 of 1 | 9 | 4.00 |",
+    ]
