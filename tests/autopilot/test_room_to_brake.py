@@ -337,6 +337,16 @@ def test_a_flight_is_given_up_only_where_all_of_it_has_too_little_to_spare(world
         assert soon_m == found_m if found_m >= enough_m else soon_m < enough_m
 
 
+def test_what_disturbances_may_lead_off_counts_at_the_fence_beyond_a_first_look(worlds):
+    world = worlds["light"]
+    tube_m = world.arena.tube_m[0, 6]
+    assert tube_m > 0.1
+    path_m = np.tile(MIDDLE_M, (7, 1))
+    path_m[:, 1] = FENCE_M + PLENTY_M + tube_m / 2.0
+    found_m = fixed_slack(world.arena, 0, path_m, 6, -math.inf, PLENTY_M)
+    assert found_m == pytest.approx(PLENTY_M - tube_m / 2.0)
+
+
 def test_a_flight_out_of_the_fence_is_given_up_where_it_leaves_it():
     world = World(meadow([(190.0, 100.0, -15.0)]), safety_filter=True)
     path_m = np.full((int(world.arena.rules[0].lookahead_steps) + 1, 3), np.nan)

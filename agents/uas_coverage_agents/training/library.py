@@ -40,6 +40,11 @@ class LibraryLearner:
     def __init__(
         self, settings: LearnerSettings, missions: Missions, seed: int, algorithm: type
     ) -> None:
+        if settings.device != "cpu":
+            raise InputError(
+                f"device = {settings.device!r}: {settings.algorithm} learns from environments on "
+                "the processor; ppo-waypoint and ppo-velocity learn on a GPU"
+            )
         self._settings, self._seed = settings, seed
         source = missions.source()
         self._room, self._chosen = source.room, missions.settings()
