@@ -200,10 +200,24 @@ def own_settings(settings: LearnerSettings, model: type[M], reads: Collection[st
     Raises:
         InputError: There is something else in it, or a key that this learner does not read.
     """
-    on_processor = {"device"} if settings.device == "cpu" else set()
-    for name in settings.model_fields_set - _OF_ALL - on_processor - set(reads):
+    if "device" not in reads:
+        check_on_processor(settings)
+    for name in settings.model_fields_set - {*_OF_ALL, "device", *reads}:
         raise InputError(f"{name} = {getattr(settings, name)!r}: {settings.algorithm} reads none")
     return parse(settings.learning, model, "[learning]")
+
+
+def check_on_processor(settings: LearnerSettings) -> None:
+    """For learners that know no other device.
+
+    Raises:
+        InputError: They are asked to learn on one.
+    """
+    if settings.device != "cpu":
+        raise InputError(
+            f"device = {settings.device!r}: {settings.algorithm} learns on the processor; "
+            "ppo-waypoint and ppo-velocity learn on a GPU, too"
+        )
 
 
 def class_named(name: str) -> Any:
