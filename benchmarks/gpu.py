@@ -7,7 +7,8 @@ Each set of missions is flown on the GPU and as a batch under the same random ac
 alone for every number of missions; `ppo-waypoint` is trained there on missions drawn from `hard`,
 environment, network and learning together; beside them VMAS and JaxMARL on the GPU, where this
 Python has them. A row is a UAS and a step, whatever it does; of the training, a decision that was
-learned from. What does not fit into the time is left out, and named. With NUMBA_ENABLE_CUDASIM=1 and NUMBA_DISABLE_JIT=1 numba's simulator is taken for a GPU.
+learned from. What does not fit into the time is left out, and named. With NUMBA_ENABLE_CUDASIM=1
+and NUMBA_DISABLE_JIT=1 numba's simulator is taken for a GPU.
 """
 
 import itertools
