@@ -4,11 +4,14 @@
     python benchmarks/gpu.py --registers   what the compiler says of each launch; needs no GPU
 
 Each set of missions is flown on the GPU and as a batch under the same random actions, and then
-alone for every number of missions; beside them VMAS and JaxMARL on the GPU, where this Python has
-them. A row is a UAS and a step, whatever it does. What does not fit into the time is left out, and
-named. With NUMBA_ENABLE_CUDASIM=1 and NUMBA_DISABLE_JIT=1 numba's simulator is taken for a GPU.
+alone for every number of missions; `ppo-waypoint` is trained there on missions drawn from `hard`,
+environment, network and learning together; beside them VMAS and JaxMARL on the GPU, where this
+Python has them. A row is a UAS and a step, whatever it does; of the training, a decision that was
+learned from. What does not fit into the time is left out, and named. With NUMBA_ENABLE_CUDASIM=1
+and NUMBA_DISABLE_JIT=1 numba's simulator is taken for a GPU.
 """
 
+import itertools
 import json
 import os
 import re
@@ -39,6 +42,7 @@ from uas_coverage_env.env.gpu import missions as on_gpu
 from uas_coverage_env.env.gpu.device import on_device, on_host
 from uas_coverage_env.env.gpu.missions import CudaMissions
 from uas_coverage_env.env.versions import version_named
+from uas_coverage_env.files.strict_toml import InputError
 
 N_DRAWN = 64
 """Scenarios that drawn missions come from."""
@@ -49,6 +53,11 @@ N_ACTIONS = 4
 MOST_APART, MOST_PARTED = 1e-4, 0.02
 """Numbers of an observation differ by rounding; a mission in which one differs by more has parted
 from the batch's, as where a waypoint is covered a step later. So many may [-]."""
+
+TRAINING = "train ppo-waypoint, hard"
+TRAINING_S, MOST_TRAINED = 120.0, 16_384
+"""It is begun only with so much time left, of which most is compiling [s]; and with so many
+missions at most, whose decisions fit into the memory."""
 
 TURNS, TURN_S = 5, 0.4
 PEERS = {"vmas": "vmas-cuda", "jaxmarl": "jaxmarl"}
@@ -119,6 +128,37 @@ def rates_of(what: Any, settings: dict[str, Any], n: int, turn_s: float) -> list
     stepped_s(1)
     n_steps = max(1, int(turn_s / stepped_s(2) * 2))
     return [n_steps * n * missions.n_uas / stepped_s(n_steps) for _ in range(TURNS)]
+
+
+def training_rates(scenario: str, n: int, n_steps: int) -> list[float]:
+    """Decisions per second that `ppo-waypoint` learns from, from update to update.
+
+    The first one, in which all is compiled, counts for none.
+    """
+    from uas_coverage_agents.training.learner import Told
+    from uas_coverage_agents.training.missions import Missions
+    from uas_coverage_agents.training.rounds import learner_of
+    from uas_coverage_agents.training.settings import settings_of
+
+    level = "hard" if scenario == "village" else scenario
+    changes = [
+        *(f"num_envs={n}", f"learning.n_steps={n_steps}", f"total_timesteps={8 * n * n_steps}"),
+        *("rounds=1", f"learning.missions={N_DRAWN}", f"learning.batch_size={max(2048, n)}"),
+        *("environment.return_mode=false", "environment.safety_filter=false", "device=cuda"),
+    ]
+    settings = settings_of("ppo-waypoint", scenario=level, changes=changes)
+    seen: list[tuple[float, int]] = []
+
+    class Timed(Told):
+        def add(self, steps: int, **numbers: float) -> None:
+            cuda.synchronize()
+            seen.append((time.perf_counter(), steps))
+
+    learner_of(settings, Missions.of(settings), 0).learn(0, Timed())
+    return [
+        (steps - before) / (now_s - before_s)
+        for (before_s, before), (now_s, steps) in itertools.pairwise(seen)
+    ]
 
 
 def peer_rates(peer: str, n: int, turn_s: float) -> list[float]:
@@ -215,16 +255,18 @@ def main(
     found: dict[str, dict[str, Any]] = {}
     equal, left_out = True, []
 
-    def in_time(what: str) -> bool:
-        if time.monotonic() < until_s:
+    def in_time(what: str, takes_s: float = 0.0) -> bool:
+        if time.monotonic() + takes_s < until_s:
             return True
         left_out.append(what)
         return False
 
-    def measure(name: str, rates: Callable[[int], list[float]]) -> None:
+    def measure(
+        name: str, rates: Callable[[int], list[float]], takes_s: float = 0.0, most: int = 10**9
+    ) -> None:
         cells = []
         for n in numbers:
-            own = rates(n) if in_time(f"{name}, {n:,}") else []
+            own = rates(n) if n <= most and in_time(f"{name}, {n:,}", takes_s) else []
             found.setdefault(name, {})[str(n)] = own
             cells.append(_spread([rate / 1e6 for rate in own]))
         table.add_row(name, *cells)
@@ -235,6 +277,15 @@ def main(
             equal &= little
             console.print(f"{name}: {words}")
             measure(name, lambda n, given=(what, settings): rates_of(*given, n, turn_s))
+    if find_spec("torch") is None:
+        console.print("torch is not installed here: nothing is trained")
+    else:
+        try:
+            measure(
+                TRAINING, lambda n: training_rates(scenario, n, steps), TRAINING_S, MOST_TRAINED
+            )
+        except InputError as error:
+            console.print(f"not trained: {error}", markup=False)
     for peer in PEERS:
         if find_spec(peer) is None:
             console.print(f"{peer} is not installed here")

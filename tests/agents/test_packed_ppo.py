@@ -109,7 +109,7 @@ def test_the_saved_policy_gives_what_torch_gives(name, tmp_path):
     learner = learned(settings)
     seen, _ = observed(settings)
     with torch.no_grad():
-        expected = learner._model.outputs(*learner._model.read(seen)).numpy()
+        expected = learner._model.outputs(*learner._model.read(torch.from_numpy(seen))).numpy()
     found = policy(learner, settings).forward(seen)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * max(1, abs(found).max()))
     assert np.ptp(found, axis=0).max() > 0.0
@@ -127,7 +127,7 @@ def test_a_masked_choice_is_never_taken_neither_in_flight_nor_with_noise():
     choice = action_of(policy(learner, settings))
     assert masks[rows, choice({"observation": seen, "action_mask": masks})].all()
     with torch.no_grad():
-        outputs = learner._model.outputs(*learner._model.read(seen))
+        outputs = learner._model.outputs(*learner._model.read(torch.from_numpy(seen)))
         for _ in range(50):
             drawn, likely = draws.drawn(outputs, torch.from_numpy(masks), 1.0)
             assert masks[rows, drawn.numpy()].all()
@@ -158,7 +158,8 @@ def test_choices_are_drawn_in_flight_as_often_as_learned_and_by_what_is_observed
 def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
     settings = tiny("ppo-waypoint", "learning.n_steps=40")
     learner = made(settings)
-    batch = learner._batch(learner._own.phases[0], 0)
+    missions = learner._begun(learner._own.phases[0], 0)
+    batch = missions._flown
     flew, step = [], batch.step
 
     def noted(actions):
@@ -167,7 +168,7 @@ def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
         return step(actions)
 
     batch.step = noted
-    flown = packed._Flown(batch, learner._own)
+    flown = packed._Flown(missions, learner._own)
     rows = flown.collect(learner._model, 1.0)
     flew = np.array(flew)
     assert len(rows.read) == len(rows.actions) == len(rows.returns) == flew.sum()
@@ -181,7 +182,7 @@ def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
 def test_a_flight_ends_where_its_time_runs_out():
     changes = "environment.max_cycles=5", "environment.return_mode=false"
     learner = made(tiny("ppo-velocity", *changes))
-    flown = packed._Flown(learner._batch(learner._own.phases[0], 0), learner._own)
+    flown = packed._Flown(learner._begun(learner._own.phases[0], 0), learner._own)
     flown.collect(learner._model, 0.01)  # 8 steps of 2 missions of 2 UAS
     told = flown.tell()
     assert (told["flights"], told["home"], told["lost_or_late"]) == (4, 0.0, 1.0)
@@ -191,7 +192,7 @@ def test_advantages_look_ahead_to_an_end_and_not_beyond():
     rewards = np.array([[1.0], [2.0], [4.0]], np.float32)
     values = np.array([[0.5], [0.25], [8.0], [3.0]], np.float32)
     ended = np.array([[False], [True], [False]])
-    found = advantages_of(rewards, values, ended, 0.5, 0.5)[:, 0]
+    found = advantages_of(*map(torch.from_numpy, (rewards, values, ended)), 0.5, 0.5)[:, 0]
     last = 4.0 + 0.5 * 3.0 - 8.0
     second = 2.0 - 0.25
     first = 1.0 + 0.5 * 0.25 - 0.5 + 0.25 * second
@@ -216,7 +217,7 @@ def test_a_phase_pays_by_its_own_weights_and_lessons_are_as_many_missions_as_it_
         {begins=0.5, reward_weights={home=7.0}},
     ]"""
     learner = made(tiny("ppo-waypoint", f"learning.phases={phases}", "learning.missions=8"))
-    first, second = (learner._batch(phase, 0) for phase in learner._own.phases)
+    first, second = (learner._begun(phase, 0)._flown for phase in learner._own.phases)
     at = first.settings.term_names.index("home")
     assert [first.settings.weights[at], second.settings.weights[at]] == [1.0, 7.0]
     missions = [learner._missions.mission(k) for k in range(8)]

@@ -132,8 +132,8 @@ def test_torch_and_numpy_give_the_same_scores_and_means(numbers, slope):
     seen = rng.uniform(-1.0, 1.0, (40, network.inputs)).astype(np.float32)
     seen[:, columns("ways", "leg")] = rng.uniform(0.2, 1.0, (40, CANDIDATES, 1))
     seen[:20, columns("waypoints", "valid").min() :] = 0.0
-    model.standardise(*model.read(seen), None)
-    expected = model.outputs(*model.read(seen)).detach().numpy()
+    model.standardise(*model.read(torch.from_numpy(seen)), None)
+    expected = model.outputs(*model.read(torch.from_numpy(seen))).detach().numpy()
     tensors = {name: each.astype(float) for name, each in model.tensors().items()}
     found = network.forward(tensors, seen)
     assert found.shape == (40, CANDIDATES + 2, 1 + numbers)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from small_worlds import box, meadow, waypoint
 
-from uas_coverage_env.autopilot.guidance import path_length_home_m
 from uas_coverage_env.autopilot.return_mode import seconds_home
+from uas_coverage_env.autopilot.return_path import route_home
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.scenario import generate_scenario, load_scenario
 from uas_coverage_env.simulation import World
@@ -108,15 +108,15 @@ def test_the_way_home_goes_round_what_is_tall():
     house = box("house", (80.0, 40.0, -45.0), (120.0, 110.0, 0.0))
     world = World(meadow([(180.0, 75.0, -1.0)], obstacles=[house]))
     x = world.state.x[0].copy()
-    straight_m = path_length_home_m(world.arena, 0, x)
+    straight_m = route_home(world.arena, 0, *x[:3])[2]
     assert straight_m == pytest.approx(0.0)
     x[:3] = 20.0, 75.0, -10.0
-    round_m = path_length_home_m(world.arena, 0, x)
+    round_m = route_home(world.arena, 0, *x[:3])[2]
     # round the corners of the house, 2.36 m to keep and 1 m of margin beside its walls
     shortest = 40.0 + 6.72 + 2 * math.hypot(60.0 - 3.36, 35.0 + 3.36)
     assert shortest < round_m < shortest + 5.0
     x[2] = -49.4
-    assert path_length_home_m(world.arena, 0, x) > 160.0
+    assert route_home(world.arena, 0, *x[:3])[2] > 160.0
     assert seconds_home(world.arena, 0, x) > round_m / 12.0 + 48.4 / 1.5
 
 

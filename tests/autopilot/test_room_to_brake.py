@@ -314,3 +314,48 @@ def test_a_way_is_claimed_for_five_seconds_and_braked_then(dt_s):
     fly_and_brake(world.arena, 0, *state, command, False, expected_m,
                   world.state.uas[0].belief[:], round(5.0 / dt_s))  # fmt: skip
     np.testing.assert_array_equal(claim_m, expected_m)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1), level=st.sampled_from(["still", "light", "high"]))
+def test_a_flight_is_given_up_only_where_all_of_it_has_too_little_to_spare(worlds, seed, level):
+    world, rng = worlds[level], np.random.default_rng(seed)
+    # at rest or moving, near sides and corners of the fence; some so near that leaving is allowed
+    side_m = rng.choice([0.3, 0.8, 4.0, 15.0, 185.0, 199.2], 2)
+    world.state.x[:] = 0.0
+    world.state.x[:, :3] = MIDDLE_M
+    world.state.x[0, :3] = *side_m, -rng.uniform(1.0, 49.0)
+    world.state.x[0, VX : VX + 3] = rng.uniform(-2.0, 2.0, 3)
+    committed_m = np.zeros((3, int(world.arena.rules[0].lookahead_steps) + 1, 3))
+    committed_m[:] = world.state.x[:, None, :3]
+    path_m = np.zeros_like(committed_m[0])
+    for enough_m in (0.0, -1e-3, 0.7):
+        command = command_of(CLIMB, *rng.uniform(-10.0, 10.0, 2), rng.uniform(-1.5, 1.0))
+        asked = world.arena, world.state, 0, command, False, enough_m, path_m, committed_m
+        found_m = braking_slack(*asked)
+        soon_m = braking_slack(*asked, True, True)
+        assert soon_m == found_m if found_m >= enough_m else soon_m < enough_m
+
+
+def test_what_disturbances_may_lead_off_counts_at_the_fence_beyond_a_first_look(worlds):
+    world = worlds["light"]
+    tube_m = world.arena.tube_m[0, 6]
+    assert tube_m > 0.1
+    path_m = np.tile(MIDDLE_M, (7, 1))
+    path_m[:, 1] = FENCE_M + PLENTY_M + tube_m / 2.0
+    found_m = fixed_slack(world.arena, 0, path_m, 6, -math.inf, PLENTY_M)
+    assert found_m == pytest.approx(PLENTY_M - tube_m / 2.0)
+
+
+def test_a_flight_out_of_the_fence_is_given_up_where_it_leaves_it():
+    world = World(meadow([(190.0, 100.0, -15.0)]), safety_filter=True)
+    path_m = np.full((int(world.arena.rules[0].lookahead_steps) + 1, 3), np.nan)
+    state = world.state.x[0], world.state.uas[0].reference_mps[:]
+    command = command_of(CLIMB, 12.0, 0.0, 0.0)
+    beyond = (
+        world.arena, 0, *state, command, False, path_m, world.state.uas[0].belief[:], 9, 0.0,
+    )  # fmt: skip
+    n_flown, slack_m = fly_and_brake(*beyond)
+    assert slack_m == -math.inf
+    assert path_m[n_flown, 0] > 200.0 - FENCE_M >= path_m[n_flown - 1, 0]
+    assert np.isnan(path_m[n_flown + 1 :]).all()

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import pytest
 from markdown_blocks import PAGES, ROOT, blocks, command_lines, save_files
+from numba import cuda
 from uas_coverage_baselines.milp_mpc.moving_horizon import MovingHorizon
 from uas_coverage_baselines.reproduction import command as reproduction
 
@@ -75,6 +76,10 @@ def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypa
             monkeypatch.setattr("sys.stdin", StringIO("no\n"))
             assert main(words) == REFUSED
             assert "vehicles would arm and take off" in capsys.readouterr().err
+            continue
+        if "cuda" in words and not cuda.is_available():
+            assert main(words) == REFUSED
+            assert "training on a GPU: " in capsys.readouterr().err
             continue
         # a planner may fail its mission, and the text may say so; the command has done its work
         assert main(words) in (DONE, FAILED), f"{words}: {capsys.readouterr().err}"

@@ -31,8 +31,9 @@ def test_missions_are_checked_and_measured_on_the_simulator(tmp_path):
     found = json.loads(file.read_text())
     assert found["equal"]
     ours = ["velocity", "v1, waypoint", "v1, waypoint, drawn"]
-    assert list(found["rows_per_s"])[:3] == ours
-    for name in ours:
+    trained = "train ppo-waypoint, hard"
+    assert list(found["rows_per_s"])[:4] == [*ours, trained]
+    for name in (*ours, trained):
         assert found["rows_per_s"][name].keys() == {"1", "2"}
         assert min(map(min, found["rows_per_s"][name].values())) > 0
 

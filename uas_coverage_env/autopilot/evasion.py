@@ -88,7 +88,7 @@ def room_from_movers(arena, step, i, path_m):
 def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
     """Whether braking after one step of a command is clear of all that stands still or brakes."""
     slack_m = braking_slack(
-        arena, state, i, command, nonlinear, -TOLERANCE_M, path_m, committed_m, moving=False
+        arena, state, i, command, nonlinear, -TOLERANCE_M, path_m, committed_m, False, True
     )
     return slack_m >= -TOLERANCE_M
 
@@ -97,7 +97,11 @@ def _is_provable(arena, state, i, command, nonlinear, path_m, committed_m):
 def _is_open(arena, state, i, command, n_held, nonlinear, path_m, committed_m):
     """Whether an evasive flight meets nothing that stands still and no path of another UAS."""
     x, reference, belief = state.x[i], state.uas[i].reference_mps[:], state.uas[i].belief[:]
-    fly_and_brake(arena, i, x, reference, command, nonlinear, path_m, belief, n_held)
+    _, rest_m = fly_and_brake(
+        arena, i, x, reference, command, nonlinear, path_m, belief, n_held, 0.0
+    )
+    if rest_m == -math.inf:
+        return False
     slack_m = fixed_slack(arena, i, path_m, path_m.shape[0] - 1, 0.0, PLENTY_M)
     if slack_m >= 0.0:
         slack_m = peer_slack(arena, state.uas, i, path_m, committed_m, 0.0, slack_m)

@@ -89,13 +89,6 @@ def target_position(arena, i, target):
     return target, position_m[0], position_m[1], position_m[2]
 
 
-@kernel
-def path_length_home_m(arena, i, x):
-    """Length [m] of the horizontal way home of UAS i past the tall obstacles."""
-    row, x1, y1, z1 = target_position(arena, i, HOME)
-    return route(arena, row, x[S.X], x[S.Y], x[S.Z], x1, y1, z1)[2]
-
-
 @inlined_kernel
 def comes_to_rest(arena, state, target):
     """Whether guidance stops at a target, as it does at home, and does not fly by.

@@ -36,6 +36,9 @@ _STILL_MPS, _STILL_RAD = 0.02, 0.004
 """A UAS stands when its speed is less, its tilt nearer to that of a hover, and its rates
 [rad/s] are less: what is left of the motion is centimetres."""
 
+_SURELY_M = 1e-6
+"""More than rounding can change in a distance [m]."""
+
 _CREEPING_MPS = 0.1
 """A UAS that is no faster at the end of a prediction is taken to stand, too."""
 
@@ -76,9 +79,39 @@ def fly_kinematically(vehicle, x, governed, command, u, belief=None):
         _fly_as_believed(vehicle, belief, x, governed, command, False, u)
 
 
+@kernel
+def _tube_at(arena, i, k):
+    """The tube of UAS i after k steps [m]; beyond the lookahead as wide as at its end."""
+    return arena.tube_m[i, min(k, arena.tube_m.shape[1] - 1)]
+
+
+@kernel
+def _nears_fence(arena, i, path_m, k, enough_m):
+    """Whether the k-th place of a path has less than enough to spare from the geofence, for sure.
+
+    What is kept is no more than what `_fence_slack` keeps, so that this is never said in error.
+    """
+    rules = arena.rules[0]
+    normals, offsets_m = arena.normals, arena.offsets_m
+    for h in range(rules.fence_first, rules.fence_last):
+        spare_m = -signed_distance(
+            normals, offsets_m, h, h + 1, path_m[k, 0], path_m[k, 1], path_m[k, 2]
+        )
+        at_least = max(abs(normals[h, 0]), abs(normals[h, 1]))
+        kept_m = rules.fence_margin_m + at_least * _tube_at(arena, i, k)
+        if spare_m - kept_m < enough_m - _SURELY_M:
+            now_m = -signed_distance(
+                normals, offsets_m, h, h + 1, path_m[0, 0], path_m[0, 1], path_m[0, 2]
+            )
+            if spare_m - _kept_m(kept_m, now_m) < enough_m - _SURELY_M:
+                return True
+    return False
+
+
 @rare_kernel
 def fly_and_brake(
-    arena, i, start, reference, command, nonlinear, path_m, belief=None, n_held=1
+    arena, i, start, reference, command, nonlinear, path_m, belief=None, n_held=1,
+    enough_m=-math.inf,
 ):  # fmt: skip
     """Simulate a command for one step, or n_held, then braking until the UAS stands.
 
@@ -86,11 +119,12 @@ def fly_and_brake(
     found safe, its braking flight is still there to be flown in the next step: from a safe state
     there is always a safe command (against what stands still).
 
-    Nothing but `path_m` is written; after a stop the position stays.
+    Nothing but `path_m` is written; after a stop the position stays. `enough_m`: the flight is
+    given up where `fixed_slack` is less than this for sure, by the geofence.
 
     Returns:
         (steps until it stands, slack [m]): the slack is PLENTY_M, but negative where the UAS has
-        not come to rest at the end of the path.
+        not come to rest at the end of the path, and -inf where the flight was given up.
     """
     n_steps = path_m.shape[0] - 1
     vehicle = arena.vehicles[i]
@@ -125,6 +159,8 @@ def fly_and_brake(
             reseed_reference(vehicle, x, governed)
         for axis in range(3):
             path_m[k + 1, axis] = x[S.X + axis]
+        if enough_m > -math.inf and _nears_fence(arena, i, path_m, k + 1, enough_m):
+            return k + 1, -math.inf
         if k + 1 >= n_held and _is_still(x, roll_rad, pitch_rad):
             for later in range(k + 2, n_steps + 1):
                 for axis in range(3):
@@ -146,12 +182,6 @@ def _box_of(path_m, n_flown, low, high):
 
 
 @kernel
-def _tube_at(arena, i, k):
-    """The tube of UAS i after k steps [m]; beyond the lookahead as wide as at its end."""
-    return arena.tube_m[i, min(k, arena.tube_m.shape[1] - 1)]
-
-
-@kernel
 def _fence_slack(arena, i, path_m, n_flown, low, high, slack_m):
     """The smaller of slack_m and the distance to spare from the geofence along a path."""
     rules = arena.rules[0]
@@ -160,13 +190,13 @@ def _fence_slack(arena, i, path_m, n_flown, low, high, slack_m):
     required_m = rules.fence_margin_m
     for h in range(rules.fence_first, rules.fence_last):
         outermost = offsets_m[h]
-        # disturbances move a UAS horizontally
-        level = math.hypot(normals[h, 0], normals[h, 1])
         for axis in range(3):
             outermost += max(normals[h, axis] * low[axis], normals[h, axis] * high[axis])
-        if -outermost - required_m - level * _tube_at(arena, i, n_flown) >= slack_m:
+        if -outermost - required_m - _tube_at(arena, i, n_flown) - _SURELY_M >= slack_m:
             # the whole box around the path is far enough from this face
             continue
+        # disturbances move a UAS horizontally
+        level = math.hypot(normals[h, 0], normals[h, 1])
         for k in range(1, n_flown + 1):
             spare_m = -signed_distance(
                 normals, offsets_m, h, h + 1, path_m[k, 0], path_m[k, 1], path_m[k, 2]
@@ -349,11 +379,13 @@ def peer_slack(arena, uas, i, path_m, committed_m, enough_m, slack_m):
 
 @kernel
 def braking_slack(
-    arena, state, i, command, nonlinear, enough_m, path_m, committed_m, moving=True
+    arena, state, i, command, nonlinear, enough_m, path_m, committed_m, moving=True, in_doubt=False
 ):  # fmt: skip
     """Least distance to spare when a command is flown and then braked [m].
 
-    From all that stands still or brakes, and if `moving` from what moves, too.
+    From all that stands still or brakes, and if `moving` from what moves, too. `in_doubt`: where
+    most such commands have less than enough to spare, the flight is given up as soon as that is
+    sure, and `path_m` is its beginning; the answer is less than enough all the same.
     """
     n_flown, slack_m = fly_and_brake(
         arena,
@@ -364,6 +396,8 @@ def braking_slack(
         nonlinear,
         path_m,
         state.uas[i].belief[:],
+        1,
+        enough_m if in_doubt else -math.inf,
     )
     if slack_m >= enough_m:
         slack_m = fixed_slack(arena, i, path_m, n_flown, enough_m, slack_m)

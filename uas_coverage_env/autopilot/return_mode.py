@@ -6,8 +6,7 @@ still air and in wind (`--level`), and `benchmarks/returns.py` how much they kee
 
 import math
 
-from uas_coverage_env.autopilot.guidance import path_length_home_m
-from uas_coverage_env.autopilot.return_path import flight_home, latest_flight_home
+from uas_coverage_env.autopilot.return_path import flight_by, latest_flight_home, route_home
 from uas_coverage_env.compiled.kernels import kernel
 from uas_coverage_env.entities.state import CONSUMPTION, FLYING, WIND
 from uas_coverage_env.vehicle import layout as S
@@ -48,10 +47,15 @@ UNHINDERED = RETURN_MODE._replace(speed_share=1.0)
 @kernel
 def seconds_home(arena, i, x):
     """Time [s] that UAS i is given to fly home and land, held up by others (`RETURN_MODE`)."""
+    return _held_up_s(arena, i, x, route_home(arena, i, x[S.X], x[S.Y], x[S.Z])[2])
+
+
+@kernel
+def _held_up_s(arena, i, x, way_m):
+    """`seconds_home` by a way of this length."""
     uas = arena.uas[i]
     altitude_m = max(-x[S.Z] + uas.home_m[2], 0.0)
     speeds = SpeedLimits(uas.speed_mps, uas.climb_mps, uas.descent_mps)
-    way_m = path_length_home_m(arena, i, x)
     quickly_s = flight_seconds(UNHINDERED, speeds, 0.0, way_m, 0.0, altitude_m)
     held_up_s = flight_seconds(RETURN_MODE, speeds, 0.0, way_m, 0.0, altitude_m)
     return min(held_up_s, quickly_s + _HELD_UP_S)
@@ -59,20 +63,28 @@ def seconds_home(arena, i, x):
 
 @kernel
 def seconds_to_keep(arena, i, x, left_s, belief=None):
+    """`seconds_to_keep_by` the route home from where UAS i is."""
+    way = route_home(arena, i, x[S.X], x[S.Y], x[S.Z])
+    return seconds_to_keep_by(way, arena, i, x, left_s, belief)
+
+
+@kernel
+def seconds_to_keep_by(way, arena, i, x, left_s, belief=None):
     """Time [s] that battery and clock must leave UAS i now, so that it still comes home.
 
-    The larger of two: the calibrated flight with its margin (`flight_home`), which knows of
+    The larger of two: the calibrated flight with its margin (`flight_by`), which knows of
     braking, turning and climbing over roofs, some steps later; and the same from where it can come
     to rest after one more step (`latest_flight_home`), looked at only where little is left.
 
     Args:
+        way: `route_home` from there.
         arena: The mission.
         i: Index of the UAS.
         x: (14,) its state.
         left_s: What battery and clock leave [s].
         belief: (N_BELIEF,) of its inner loop; None: in still air.
     """
-    seconds, margin_s = flight_home(arena, i, x, belief)
+    seconds, margin_s = flight_by(arena, i, x, way, belief)
     now_s = seconds + margin_s
     keep_s = now_s + _STEPS_LATER * arena.rules[0].dt_s
     if keep_s < left_s < _FAR_FROM_EMPTY * now_s + _FAR_FROM_EMPTY_S:
@@ -102,7 +114,8 @@ def _calls_home(arena, state, i, share, more_s):
     x = state.x[i]
     rules = arena.rules[0]
     uas = arena.uas[i]
-    home_s = share * seconds_home(arena, i, x) + more_s
+    way = route_home(arena, i, x[S.X], x[S.Y], x[S.Z])
+    home_s = share * _held_up_s(arena, i, x, way[2]) + more_s
     time_left_s = (rules.max_steps - state.step[0]) * rules.dt_s
     if home_s + rules.clock_reserve_s - RETURN_MODE.landing_s > time_left_s:
         return True
@@ -116,7 +129,8 @@ def _calls_home(arena, state, i, share, more_s):
     # never less than the model says: what is saved now may be needed on the way
     per_s = uas.dod_per_s * (1.0 + max(belief[CONSUMPTION], 0.0))
     left_s = min(time_left_s, (uas.dod_max - x[S.DOD]) / per_s - _waiting_s(arena, i))
-    return share * seconds_to_keep(arena, i, x, left_s, belief) + more_s >= left_s
+    keep_s = seconds_to_keep_by(way, arena, i, x, left_s, belief)
+    return share * keep_s + more_s >= left_s
 
 
 @kernel

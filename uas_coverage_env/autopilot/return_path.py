@@ -34,6 +34,12 @@ turns."""
 _ON_WHILE_STOPPING = 0.6  # of that time, for how long the speed now would lead as far [-]
 _PLACES_AROUND, _RINGS = 8, 2  # where a UAS may come to rest after one more step
 
+_TOWARDS = tuple(
+    (math.cos(angle), math.sin(angle))
+    for angle in (2.0 * math.pi * k / _PLACES_AROUND for k in range(_RINGS * _PLACES_AROUND + 1))
+)
+"""North and east of the directions of these places."""
+
 _WIND_MARGIN_S, _WIND_MARGIN_SHARE = 15.0, 0.15
 """Where disturbances are declared, the margin is more: this share of the time [-], and these
 seconds in a wind as fast as the UAS, in which it turns and stops the more slowly. How often that is
@@ -92,11 +98,18 @@ def _more_in_wind_s(arena, i, belief, north_m, east_m):
     return length_m / speed_mps - length_m / arena.uas[i].speed_mps
 
 
-@kernel
-def _flight_from(arena, i, x0, y0, z0, away_mps, belief=None):
-    """See `flight_home`: from a place, flying away from home at away_mps."""
+@inlined_kernel
+def route_home(arena, i, x0, y0, z0):
+    """`route` of UAS i from a place to its home."""
     row, x1, y1, z1 = target_position(arena, i, HOME)
-    end_x, end_y, way_m, leg = route(arena, row, x0, y0, z0, x1, y1, z1)
+    return route(arena, row, x0, y0, z0, x1, y1, z1)
+
+
+@kernel
+def _flight_from(arena, i, x0, y0, z0, way, away_mps, belief=None):
+    """See `flight_home`: from a place, by `route_home` from there, flying away at away_mps."""
+    row, x1, y1, z1 = target_position(arena, i, HOME)
+    end_x, end_y, way_m, leg = way
     obstructed = leg != CLEAR
     roof_m, before_m, until_m = -math.inf, way_m, 0.0
     flown_m = 0.0
@@ -139,12 +152,19 @@ def _flight_from(arena, i, x0, y0, z0, away_mps, belief=None):
 
 @kernel
 def flight_home(arena, i, x, belief=None):
-    """Time to fly UAS i home and land it, past the fixed obstacles.
+    """Time to fly UAS i home and land it, past the fixed obstacles: `flight_by` the route."""
+    return flight_by(arena, i, x, route_home(arena, i, x[S.X], x[S.Y], x[S.Z]), belief)
+
+
+@kernel
+def flight_by(arena, i, x, way, belief=None):
+    """Time to fly UAS i home by a route, and land it.
 
     Args:
         arena: The mission.
         i: Index of the UAS.
         x: (14,) its state.
+        way: `route_home` from there.
         belief: (N_BELIEF,) of its inner loop; None: in still air.
 
     Returns:
@@ -155,7 +175,7 @@ def flight_home(arena, i, x, belief=None):
     east_m = home_m[1] - x[S.Y]
     away_m = max(math.hypot(north_m, east_m), 1e-9)
     away_mps = -(north_m * x[S.VX] + east_m * x[S.VY]) / away_m
-    return _flight_from(arena, i, x[S.X], x[S.Y], x[S.Z], away_mps, belief)
+    return _flight_from(arena, i, x[S.X], x[S.Y], x[S.Z], way, away_mps, belief)
 
 
 @kernel
@@ -177,11 +197,12 @@ def latest_flight_home(arena, i, x, belief):
     z = min(x[S.Z] + dt_s * vehicle.v_down_max_mps, -arena.rules[0].floor_m)
     latest_s = 0.0
     for k in range(_RINGS * _PLACES_AROUND + 1):
-        angle = 2.0 * math.pi * k / _PLACES_AROUND
+        north, east = _TOWARDS[k]
         aside_m = around_m * ((k + _PLACES_AROUND - 1) // _PLACES_AROUND)
-        north_m = x[S.X] + on_s * x[S.VX] + aside_m * math.cos(angle)
-        east_m = x[S.Y] + on_s * x[S.VY] + aside_m * math.sin(angle)
+        north_m = x[S.X] + on_s * x[S.VX] + aside_m * north
+        east_m = x[S.Y] + on_s * x[S.VY] + aside_m * east
         if may_be_at(arena, i, north_m, east_m, z):
-            seconds, margin_s = _flight_from(arena, i, north_m, east_m, z, 0.0, belief)
+            way = route_home(arena, i, north_m, east_m, z)
+            seconds, margin_s = _flight_from(arena, i, north_m, east_m, z, way, 0.0, belief)
             latest_s = max(latest_s, seconds + margin_s)
     return dt_s + stopping_s + latest_s

@@ -8,6 +8,8 @@ on their way home themselves only out of that of one that is held up. A claim is
 gives up its room for braking because of it.
 """
 
+import math
+
 from uas_coverage_env.autopilot.evasion import LINGERING
 from uas_coverage_env.autopilot.lookahead import fly_and_brake, separation_at
 from uas_coverage_env.compiled.kernels import kernel
@@ -49,7 +51,7 @@ def claim_way(arena, state, i, command, nonlinear, claim_m):
     """Write the way (N+1, 3) [m] that UAS i would fly now if no other UAS were there."""
     n_held = max(1, round(CLAIMED_S / arena.rules[0].dt_s))
     x, reference, belief = state.x[i], state.uas[i].reference_mps[:], state.uas[i].belief[:]
-    fly_and_brake(arena, i, x, reference, command, nonlinear, claim_m, belief, n_held)
+    fly_and_brake(arena, i, x, reference, command, nonlinear, claim_m, belief, n_held, -math.inf)
 
 
 @kernel

@@ -117,7 +117,9 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     wish_mps = _wish(arena, state, i, command)
     for d in range(n_deflections):
         _deflect(arena, i, wish_mps, d, command)
-        slack_m = braking_slack(arena, state, i, command, nonlinear, 0.0, path_m, committed_m)
+        slack_m = braking_slack(
+            arena, state, i, command, nonlinear, 0.0, path_m, committed_m, True, True
+        )
         if slack_m >= 0.0:
             return
     write_brake(command)
@@ -133,7 +135,7 @@ def _replace(arena, state, i, command, nonlinear, path_m, committed_m):
     for d in range(n_deflections):
         _deflect(arena, i, wish_mps, d, command)
         slack_m = braking_slack(
-            arena, state, i, command, nonlinear, best_m, path_m, committed_m, True
+            arena, state, i, command, nonlinear, best_m, path_m, committed_m, True, True
         )
         if slack_m > best_m:
             best_m = slack_m
@@ -170,10 +172,10 @@ def _make_way(
         elif option > n_deflections:
             write_brake(command)
             enough_m = -TOLERANCE_M
-        if (
-            braking_slack(arena, state, i, command, nonlinear, enough_m, path_m, committed_m)
-            < enough_m
-        ):
+        slack_m = braking_slack(
+            arena, state, i, command, nonlinear, enough_m, path_m, committed_m, True, True
+        )
+        if slack_m < enough_m:
             continue
         room_m = room_beside(arena, i, path_m, claimants, n_claims, claims_m)
         if room_m > best_m + _NOTICEABLE_M:

@@ -30,6 +30,7 @@ _FAR_OUTSIDE = 1.5  # times a bound: up to here, a flight of the nonlinear plant
 _TOLERATED = 1.01  # times a bound: no violation yet
 _SWEEPS = 8  # of cyclic projections
 _INSIDE = 0.999  # of a bound: projections on the bound itself would end outside of the others
+_CLEARLY = 0.999  # of a square: more than rounding can change
 _HALVES = math.sqrt(0.5)  # of a norm for each of two axes
 
 
@@ -79,7 +80,11 @@ def reseed_reference(vehicle, x, reference):
 @kernel
 def _within_limit(north, east, limit):
     """By what to scale a vector so that it is no longer than a limit."""
-    return min(1.0, limit / max(math.sqrt(north * north + east * east), _TINY))
+    square = north * north + east * east
+    if square < _CLEARLY * limit * limit:
+        # mostly: what follows would say the same, and others wait for root and quotient
+        return 1.0
+    return min(1.0, limit / max(math.sqrt(square), _TINY))
 
 
 @kernel
@@ -299,10 +304,13 @@ def velocity_climb_wrench(vehicle, x, reference, north_mps, east_mps, down_mps, 
         down_mps: [m/s] positive down, kept within its limits.
         u: (5,) lift and torques are written.
     """
-    if _far_outside(vehicle, x, reference):
+    outside = _far_outside(vehicle, x, reference)
+    if outside:
         reseed_reference(vehicle, x, reference)
+    governed_north_mps, governed_east_mps = reference[0], reference[1]
     _govern(vehicle, x, reference, north_mps, east_mps)
-    if _far_outside(vehicle, x, reference):
+    moved = (reference[0] != governed_north_mps) | (reference[1] != governed_east_mps)
+    if (outside | moved) and _far_outside(vehicle, x, reference):
         _level_out(vehicle, x, u)
     else:
         _track(vehicle, x, reference, u)

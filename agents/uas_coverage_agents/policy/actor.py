@@ -1,6 +1,6 @@
 """A network that acts for each UAS of a fleet: layers, and one scorer for all candidates."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
@@ -40,6 +40,10 @@ _Vectors = Annotated[tuple[tuple[_Column, _Column, _Column], ...], Field(max_len
 _NEVER = -1e9
 _EACH = "candidates."
 _STANDARD = "offset", "scale"
+
+
+def _at(columns: Any) -> NDArray[np.intp]:
+    return np.array(columns, dtype=np.intp)
 
 
 class Candidates(StrictModel):
@@ -262,33 +266,42 @@ class Actor(StrictModel):
             shapes |= {_EACH + name: shape for name, shape in parts.items()}
         return shapes
 
-    def read(self, inputs: NDArray[np.floating]) -> NDArray[Any]:
-        """What the layers read: (..., inputs) -> (..., features)."""
-        parts = [inputs[..., self.columns], np.clip(GAIN * inputs[..., self.sharp], -1.0, 1.0)]
-        if self.ones:
-            parts.append(np.clip(GAIN * (inputs[..., self.ones] - 1.0), -1.0, 1.0))
-        if self.vectors:
-            north, east, closeness = np.array(self.vectors).T
-            distance_m = self._distance(inputs[..., closeness])
-            for reach_m in REACHES_M:
-                share = np.minimum(distance_m, reach_m) / reach_m
-                parts += [share * inputs[..., north], share * inputs[..., east]]
-        return np.concatenate(parts, axis=-1)
+    def read(self, inputs: Any, maths: Any = np, at: Callable[[Any], Any] = _at) -> Any:
+        """What the layers read, in NumPy or torch: (..., inputs) -> (..., features).
 
-    def read_of_each(self, inputs: NDArray[np.floating]) -> NDArray[Any]:
-        """What the scorer reads: (..., inputs) -> (..., candidates, their inputs)."""
+        Args:
+            inputs: Of a UAS.
+            maths: Either of them.
+            at: Makes an index of columns.
+        """
+        parts = [
+            inputs[..., at(self.columns)],
+            maths.clip(GAIN * inputs[..., at(self.sharp)], -1.0, 1.0),
+        ]
+        if self.ones:
+            parts.append(maths.clip(GAIN * (inputs[..., at(self.ones)] - 1.0), -1.0, 1.0))
+        if self.vectors:
+            north, east, closeness = map(at, zip(*self.vectors, strict=True))
+            distance_m = self._distance(maths, inputs[..., closeness])
+            for reach_m in REACHES_M:
+                share = maths.clip(distance_m, None, reach_m) / reach_m
+                parts += [share * inputs[..., north], share * inputs[..., east]]
+        return maths.concatenate(parts, -1)
+
+    def read_of_each(self, inputs: Any, maths: Any = np, at: Callable[[Any], Any] = _at) -> Any:
+        """What the scorer reads: (..., inputs) -> (..., candidates, their inputs); see `read`."""
         each = self.candidates
         assert each is not None
-        north, east, closeness = np.array(each.vectors).T
-        north_speed, east_speed = (inputs[..., [column]] for column in self.velocity)
+        north, east, closeness = map(at, zip(*each.vectors, strict=True))
+        north_speed, east_speed = (inputs[..., at((column,))] for column in self.velocity)
         there = inputs[..., north] * north_speed + inputs[..., east] * east_speed
         parts = [
-            inputs[..., np.array(each.columns)],
-            np.clip(GAIN * inputs[..., np.array(each.sharp)], -1.0, 1.0),
-            (self._distance(inputs[..., closeness]) / FAR_M)[..., np.newaxis],
-            there[..., np.newaxis],
+            inputs[..., at(each.columns)],
+            maths.clip(GAIN * inputs[..., at(each.sharp)], -1.0, 1.0),
+            (self._distance(maths, inputs[..., closeness]) / FAR_M)[..., None],
+            there[..., None],
         ]
-        return np.concatenate(parts, axis=-1)
+        return maths.concatenate(parts, -1)
 
     def forward(self, tensors: Tensors, inputs: NDArray[np.floating]) -> NDArray[np.float64]:
         """Run it.
@@ -359,9 +372,11 @@ class Actor(StrictModel):
         first, n = self._plain, len(self.vectors)
         return [first + 2 * k * n + at, first + (2 * k + 1) * n + at]
 
-    def _distance(self, closeness: NDArray[np.floating]) -> NDArray[Any]:
+    def _distance(self, maths: Any, closeness: Any) -> Any:
         nearest = self.nearby_m / (self.nearby_m + FAR_M)
-        return self.nearby_m / np.maximum(closeness, nearest) - self.nearby_m
+        # a number over a tensor is the number times its reciprocal in torch: other last digits
+        whole = maths.full_like(closeness, self.nearby_m)
+        return whole / maths.clip(closeness, nearest, None) - self.nearby_m
 
 
 def finely(number: Any, slope: float) -> Any:

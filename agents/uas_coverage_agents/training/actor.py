@@ -1,10 +1,9 @@
 """The network `policy.actor.Actor` in torch, to be learned; values have layers of their own."""
 
 from itertools import pairwise
+from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from uas_coverage_agents.policy.actor import Actor
@@ -41,6 +40,7 @@ class ActorCritic(nn.Module):
     def __init__(self, network: Actor) -> None:
         super().__init__()
         self.network, last = network, network.hidden[-1]
+        self._indices: dict[Any, Tensor] = {}
         self.layers, self.judge = (_layers(network.features, network.hidden) for _ in range(2))
         self.others = nn.Linear(last + network.features, network.others)
         self.value = nn.Linear(last, 1)
@@ -72,12 +72,18 @@ class ActorCritic(nn.Module):
         self.others.bias[0] = self.others.bias[end] = _SELDOM
         self.others.bias[near:end] = _LOW
 
-    def read(self, observed: NDArray[np.float32]) -> tuple[Tensor, Tensor | None]:
-        """What a forward pass reads of the observations of some rows."""
-        read, each = self.network.read(observed).astype(np.float32), None
+    def read(self, observed: Tensor) -> tuple[Tensor, Tensor | None]:
+        """What a forward pass reads of the observations of some rows, where they lie."""
+        read, each = self.network.read(observed, torch, self._at), None
         if self.network.candidates is not None:
-            each = torch.from_numpy(self.network.read_of_each(observed).astype(np.float32))
-        return torch.from_numpy(read), each
+            each = self.network.read_of_each(observed, torch, self._at)
+        return read, each
+
+    def _at(self, columns: Any) -> Tensor:
+        """An index of columns, which is made once and lies where the weights do."""
+        if columns not in self._indices:
+            self._indices[columns] = torch.tensor(columns, dtype=torch.int64).to(self.offset.device)
+        return self._indices[columns]
 
     def standardise(self, read: Tensor, each: Tensor | None, exists: Tensor | None) -> None:
         """Take the means and spreads of some rows as the ones to expect.
@@ -111,7 +117,7 @@ class ActorCritic(nn.Module):
 
     def tensors(self) -> Arrays:
         """Those of `Actor.shapes`."""
-        own = {name: tensor.detach().numpy() for name, tensor in self.state_dict().items()}
+        own = {name: tensor.detach().cpu().numpy() for name, tensor in self.state_dict().items()}
         names = {"offset": "offset", "scale": "scale"}
         names |= {f"others.{part}": f"others.{part}" for part in ("weight", "bias")}
         for k in range(len(self.network.hidden)):

@@ -64,6 +64,10 @@ def train(
     steps: Annotated[
         int | None, typer.Option(min=1, help="Flown steps to learn from: total_timesteps.")
     ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(metavar="cpu|cuda", help="Where environments, policy and learning lie."),
+    ] = None,
     change: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change a setting; may be repeated."),
@@ -89,7 +93,8 @@ def train(
     Leaves a checkpoint, tensorboard logs, a learning curve and, in the end, `policy/` in --out; fly
     it with `run SCENARIO --planner policy:OUT/policy`.
     """
-    changes = [*(change or ()), *([f"total_timesteps={steps}"] if steps is not None else ())]
+    given = {"total_timesteps": steps, "device": device}
+    changes = [*(change or ()), *(f"{k}={each}" for k, each in given.items() if each is not None)]
     settings = settings_of(learner, scenario=scenario, changes=changes)
     seeds, beside = _seeds(seed), _planners(baselines)
     _learn_extra()

@@ -22,7 +22,7 @@ def drawn(outputs: Tensor, masks: Tensor | None, noise: float) -> tuple[Tensor, 
         means = outputs
         if outputs.dim() == 3:
             chosen = _choice(outputs[:, :, 0])
-            means = outputs[torch.arange(len(outputs)), chosen, 1:]
+            means = outputs[torch.arange(len(outputs), device=outputs.device), chosen, 1:]
         actions = means + noise * torch.randn_like(means)
     return actions, likely(outputs, actions, masks, noise)[0]
 

@@ -18,7 +18,12 @@ from uas_coverage_agents.training.learner import Arrays, Learned, Told
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.model_arrays import learned, take_over
 from uas_coverage_agents.training.rollouts import FlownSteps, flown_buffer_of
-from uas_coverage_agents.training.settings import LearnerSettings, named_objects, takes
+from uas_coverage_agents.training.settings import (
+    LearnerSettings,
+    check_on_processor,
+    named_objects,
+    takes,
+)
 from uas_coverage_agents.training.vec_env import CoverageVecEnv
 from uas_coverage_env.env import CoverageSwarmEnv, full_state
 from uas_coverage_env.env.episode.settings import MissionSettings
@@ -40,6 +45,7 @@ class LibraryLearner:
     def __init__(
         self, settings: LearnerSettings, missions: Missions, seed: int, algorithm: type
     ) -> None:
+        check_on_processor(settings)
         self._settings, self._seed = settings, seed
         source = missions.source()
         self._room, self._chosen = source.room, missions.settings()

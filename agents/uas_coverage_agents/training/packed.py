@@ -17,6 +17,7 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 import torch
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from torch import Tensor, nn
@@ -25,13 +26,13 @@ from uas_coverage_agents.policy.actor import Actor
 from uas_coverage_agents.policy.environment import observed, plain
 from uas_coverage_agents.training.actor import ActorCritic
 from uas_coverage_agents.training.draws import drawn, likely
+from uas_coverage_agents.training.flown import CUDA, FlownMissions, device_of
 from uas_coverage_agents.training.learner import SEEDS_APART, Arrays, Learned, Told
 from uas_coverage_agents.training.missions import Missions
 from uas_coverage_agents.training.settings import Count, LearnerSettings, own_settings
 from uas_coverage_agents.training.torch_state import Modules
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.env import K_WAYPOINTS, CoverageBatch, MissionSettings
-from uas_coverage_env.env.report import STATUS
 from uas_coverage_env.files.strict_toml import InputError, StrictModel
 from uas_coverage_env.scenario import Scenario
 from uas_coverage_env.tasks.lessons import LESSONS
@@ -40,7 +41,10 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
-_READ = {"num_envs", "total_timesteps", "environment"}
+_READ = {"num_envs", "total_timesteps", "environment", "device"}
+AUTORESET = "same_step"
+"""Of missions on the processor."""
+
 _MOMENTS = ("exp_avg", "exp_avg_sq", "step")
 
 
@@ -155,6 +159,7 @@ class PackedPpo:
         for phase in self._own.phases:
             self._check(phase)
         rules = MissionSettings.of(self._keywords)
+        self._check_device(rules)
         points = rules.kind.numbers[:2] == ("north_mps", "east_mps")
         self._network = Actor.of(
             rules.observation,
@@ -167,7 +172,7 @@ class PackedPpo:
             environment=plain(self._keywords),
             slope=next(iter(rules.kind.parameters), 1.0) if points else None,
         )
-        self._model = ActorCritic(self._network)
+        self._model = ActorCritic(self._network).to(self._device)
         self._optimiser = torch.optim.Adam(self._model.parameters(), eps=1e-5)
         self._modules = Modules(model=self._model)
 
@@ -184,7 +189,7 @@ class PackedPpo:
             return
         begins = [phase.begins for phase in self._own.phases]
         phase = self._own.phases[bisect_right(begins, self._share) - 1]
-        flown = _Flown(self._batch(phase, number), self._own)
+        flown = _Flown(self._begun(phase, number), self._own)
         while self._steps < wanted:
             noise = self._noise(phase)
             rows = flown.collect(self._model, noise)
@@ -200,7 +205,7 @@ class PackedPpo:
         """Weights, the moments of Adam, and the steps."""
         arrays = {**self._modules.state_dict(), "steps": np.array(self._steps)}
         for k, kept in self._optimiser.state_dict()["state"].items():
-            arrays |= {f"adam/{k}/{name}": kept[name].numpy().copy() for name in _MOMENTS}
+            arrays |= {f"adam/{k}/{name}": kept[name].cpu().numpy().copy() for name in _MOMENTS}
         return arrays
 
     def load_state_dict(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -237,16 +242,35 @@ class PackedPpo:
         weights = {**(self._keywords.get("reward_weights") or {}), **phase.reward_weights}
         return {**self._keywords, "reward_weights": weights}
 
-    def _batch(self, phase: Phase, number: int) -> CoverageBatch:
-        """New missions for a round."""
+    def _check_device(self, rules: MissionSettings) -> None:
+        """Find where it learns, and refuse what does not fly there, before anything is compiled."""
+        if self._settings.device == CUDA:
+            from uas_coverage_env.env.gpu.refused import Asked, refuse
+
+            try:
+                refuse(Asked((), rules, None, AutoresetMode.NEXT_STEP, 1, None))
+            except ValueError as error:
+                raise InputError(f"{self._settings.algorithm}: {error}") from error
+            if rules.kind.mask and all(rules.kind is not each for each in rules.version.actions):
+                raise InputError(f"action {rules.kind.name!r}: its masks are made on the processor")
+        self._device = device_of(self._settings.device)
+
+    def _begun(self, phase: Phase, number: int) -> FlownMissions:
+        """New missions for a round; on a GPU, one that ends begins anew in the step after."""
         first = (self._seed // SEEDS_APART * self._settings.rounds + number) * self._own.missions
         drawn = [self._missions.mission(first + k) for k in range(self._own.missions)]
         taught = phase.taught(list({id(each): each for each in drawn}.values()))
-        batch = CoverageBatch(
-            self._settings.num_envs, taught, autoreset="same_step", **self._paid(phase)
-        )
-        batch.reset(self._seed * self._settings.num_envs)
-        return batch
+        num_envs, paid = self._settings.num_envs, self._paid(phase)
+        seed = self._seed * num_envs
+        if self._settings.device == CUDA:
+            from uas_coverage_env.env.gpu.missions import CudaMissions
+
+            missions = CudaMissions(num_envs, taught, **paid)
+            missions.reset(seed=seed)
+            return FlownMissions(missions, same_step=False)
+        batch = CoverageBatch(num_envs, taught, autoreset=AUTORESET, **paid)
+        batch.reset(seed)
+        return FlownMissions(batch, same_step=AUTORESET == "same_step")
 
     @property
     def _share(self) -> float:
@@ -267,7 +291,8 @@ class PackedPpo:
         advantages = (rows.advantages - rows.advantages.mean()) / (rows.advantages.std() + 1e-6)
         for _ in range(own.n_epochs):
             moved = []
-            for some in torch.randperm(len(advantages)).split(own.batch_size):
+            order = torch.randperm(len(advantages), device=self._device)
+            for some in order.split(own.batch_size):
                 each = None if rows.each is None else rows.each[some]
                 exists = None if rows.masks is None else rows.masks[some]
                 outputs = self._model.outputs(rows.read[some], each)
@@ -322,68 +347,66 @@ class _Flown:
     """Missions that are flown to learn from them; they go on from one `collect` to the next.
 
     Args:
-        batch: That has begun.
+        missions: That have begun.
         own: How long is flown, and what a reward is worth later.
     """
 
-    def __init__(self, batch: CoverageBatch, own: PackedSettings) -> None:
-        self._batch, self._own = batch, own
-        self._ended = np.zeros(3)
+    def __init__(self, missions: FlownMissions, own: PackedSettings) -> None:
+        self._missions, self._own = missions, own
+        self._ended: Tensor | float = 0.0
 
     def collect(self, model: ActorCritic, noise: float) -> Rows:
         """Fly on with what is known, with noise; nothing but decisions is kept."""
-        batch, steps = self._batch, self._own.n_steps
-        shape = (steps, batch.num_envs, batch.n_uas)
-        rewards, decided = np.zeros(shape, np.float32), np.zeros(shape, bool)
-        ended, values = decided.copy(), np.zeros((steps + 1, *shape[1:]), np.float32)
+        missions, own = self._missions, self._own
         kept: list[tuple[Any, ...]] = []
-        for t in range(steps):
-            acts = decided[t] = batch.deciding
-            read, each = model.read(batch.observation[acts])
-            masks = torch.from_numpy(batch.action_masks()[acts]) if batch.chooses else None
+        of_steps: list[tuple[Tensor, ...]] = []
+        for _ in range(own.n_steps):
+            acts = missions.deciding
+            read, each = model.read(missions.observation[acts])
+            masks = missions.masks[acts] if missions.chooses else None
             with torch.no_grad():
                 actions, chance = drawn(model.outputs(read, each), masks, noise)
-                values[t][acts] = model.values(read).numpy()
+            expected = self._values(model, acts, read)
             kept.append((read, each, masks, actions, chance))
-            batch.step(_asked(batch, acts, actions))
-            rewards[t] = self._own.reward_scale * batch.lanes.rewards
-            ended[t] = self._end(acts)
-        last = batch.deciding
-        with torch.no_grad():
-            values[steps][last] = model.values(model.read(batch.observation[last])[0]).numpy()
-        own = self._own
+            missions.step(acts, actions)
+            rewards = (own.reward_scale * missions.rewards).float()
+            of_steps.append((acts, expected, rewards, self._end(acts)))
+        missions.check()
+        last = missions.deciding
+        beyond = self._values(model, last, model.read(missions.observation[last])[0])
+        decided, expected, rewards, ended = map(torch.stack, zip(*of_steps, strict=True))
+        values = torch.cat([expected, beyond[None]])
         advantages = advantages_of(rewards, values, ended, own.gamma, own.gae_lambda)
         read, each, masks, actions, chance = map(_joined, zip(*kept, strict=True))
-        gained = torch.from_numpy(advantages[decided])
-        returns = gained + torch.from_numpy(values[:-1][decided])
-        return Rows(read, each, masks, actions, chance, gained, returns)
+        gained = advantages[decided]
+        return Rows(read, each, masks, actions, chance, gained, gained + expected[decided])
 
     def tell(self) -> dict[str, float]:
         """Of the UAS whose flights ended since the last time: how, with the noise of learning."""
-        flights, home, share = self._ended
-        self._ended[:] = 0.0
+        flights, home, share = torch.as_tensor(self._ended).expand(3).tolist()
+        self._ended = 0.0
         there = max(flights, 1.0)
         return {"flights": flights, "home": home / there, "lost_or_late": share / there}
 
-    def _end(self, acted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _values(self, model: ActorCritic, acts: Tensor, read: Tensor) -> Tensor:
+        """(L, U) what is expected, where it is asked for."""
+        values = torch.zeros(self._missions.shape, device=read.device)
+        with torch.no_grad():
+            values[acts] = model.values(read)
+        return values
+
+    def _end(self, acted: Tensor) -> Tensor:
         """(L, U) whose flight this step has ended."""
-        batch = self._batch
-        over = (batch.lanes.terminated | batch.lanes.truncated)[:, None]
-        report = np.where(over[..., None], batch.missions.final.report, batch.learners.report)
-        status = report[:, :, STATUS]
-        ended = acted & (over | (status != FLYING))
+        status = self._missions.status
+        ended = acted & (self._missions.over[:, None] | (status != FLYING))
         home = ended & (status == LANDED)
-        self._ended += ended.sum(), home.sum(), (ended & ~home).sum()
+        self._ended = self._ended + torch.stack([ended.sum(), home.sum(), (ended & ~home).sum()])
         return ended
 
 
 def advantages_of(
-    rewards: NDArray[np.float32],
-    values: NDArray[np.float32],
-    ended: NDArray[np.bool_],
-    gamma: float,
-    gae_lambda: float,
-) -> NDArray[np.float32]:
+    rewards: Tensor, values: Tensor, ended: Tensor, gamma: float, gae_lambda: float
+) -> Tensor:
     """Generalised advantages (Schulman et al. 2016); an end is worth nothing beyond its reward.
 
     Args:
@@ -396,9 +419,9 @@ def advantages_of(
     Returns:
         (T, ...).
     """
-    found, later = np.zeros_like(rewards), np.zeros(rewards.shape[1:], np.float32)
+    found, later = torch.zeros_like(rewards), torch.zeros_like(rewards[0])
     for t in range(len(rewards) - 1, -1, -1):
-        goes_on = np.where(ended[t], np.float32(0.0), np.float32(1.0))
+        goes_on = torch.where(ended[t], 0.0, 1.0)
         error = rewards[t] + gamma * goes_on * values[t + 1] - values[t]
         later = found[t] = error + gamma * gae_lambda * goes_on * later
     return found
@@ -407,10 +430,3 @@ def advantages_of(
 def _joined(parts: Sequence[Any]) -> Any:
     """Of all steps, one after the other; None where there are none."""
     return None if parts[0] is None else torch.cat(tuple(parts))
-
-
-def _asked(batch: CoverageBatch, acts: NDArray[np.bool_], actions: Tensor) -> NDArray[Any]:
-    """The actions of all lanes; where nothing is decided they have no effect."""
-    asked = np.zeros(batch.learners.asked.shape, np.float32)
-    asked[acts] = actions.reshape(len(actions), -1).numpy()
-    return asked[..., 0].astype(np.int64) if batch.chooses else asked

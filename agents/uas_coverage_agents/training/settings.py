@@ -83,6 +83,7 @@ class LearnerSettings(StrictModel):
         size: Of the missions of a family: `n_uas`, `n_waypoints`, `n_obstacles`, least and most.
         num_envs: Missions flown at the same time.
         total_timesteps: Flown steps to learn from: decisions of all agents together.
+        device: "cuda": environments, network and learning lie on a GPU, for learners that can.
         rounds: How many; each ends with a checkpoint and begins with new missions.
         environment: What it chooses of its environments.
         learning: Arguments of the class, by its own names; else the library's defaults. A text
@@ -98,6 +99,7 @@ class LearnerSettings(StrictModel):
     size: dict[Literal["n_uas", "n_waypoints", "n_obstacles"], Range] = Field(default_factory=dict)
     num_envs: Count = 8
     total_timesteps: Count = 100_000
+    device: Literal["cpu", "cuda"] = "cpu"
     rounds: Annotated[int, Field(ge=1, le=100_000)] = 10
     environment: Environment = Environment()
     learning: dict[str, Any] = Field(default_factory=dict)
@@ -198,9 +200,24 @@ def own_settings(settings: LearnerSettings, model: type[M], reads: Collection[st
     Raises:
         InputError: There is something else in it, or a key that this learner does not read.
     """
-    for name in settings.model_fields_set - _OF_ALL - set(reads):
+    if "device" not in reads:
+        check_on_processor(settings)
+    for name in settings.model_fields_set - {*_OF_ALL, "device", *reads}:
         raise InputError(f"{name} = {getattr(settings, name)!r}: {settings.algorithm} reads none")
     return parse(settings.learning, model, "[learning]")
+
+
+def check_on_processor(settings: LearnerSettings) -> None:
+    """For learners that know no other device.
+
+    Raises:
+        InputError: They are asked to learn on one.
+    """
+    if settings.device != "cpu":
+        raise InputError(
+            f"device = {settings.device!r}: {settings.algorithm} learns on the processor; "
+            "ppo-waypoint and ppo-velocity learn on a GPU, too"
+        )
 
 
 def class_named(name: str) -> Any:

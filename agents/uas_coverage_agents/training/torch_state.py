@@ -24,7 +24,7 @@ class Modules:
     def state_dict(self) -> Arrays:
         """Their weights: NETWORK/TENSOR -> array."""
         return {
-            f"{owner}/{name}": tensor.detach().numpy().copy()
+            f"{owner}/{name}": tensor.detach().cpu().numpy().copy()
             for owner, module in self._modules.items()
             for name, tensor in module.state_dict().items()
         }

@@ -34,6 +34,11 @@ def check_gpu() -> None:
         )
 
 
+def is_simulated() -> bool:
+    """Whether numba's simulator is taken for a GPU."""
+    return _SIMULATED
+
+
 def on_device(arrays: Any) -> Any:
     """The same named tuple, of arrays and named tuples, with its arrays on the device."""
     if isinstance(arrays, np.ndarray):
