@@ -10,8 +10,9 @@ program; a busy machine makes them longer, and their ratio hardly another. Itera
 simplex's, which no machine changes. Printed are medians and ranges, and of the ratio of both forms
 in a decision.
 
-What differs beyond columns and rows: a waypoint's sphere is approximated from inside by
-cos(pi / H_WP)^2, its circle by cos(pi / H_WP), so that in the plane a waypoint is larger.
+A waypoint's sphere is approximated from inside by cos(pi / H_WP)^2 of its radius, its circle by
+cos(pi / H_WP): waypoints would be larger in the plane, and with them the program. Here they have
+the smaller size in both.
 """
 
 from typing import Annotated
@@ -24,6 +25,7 @@ from uas_coverage_baselines.milp_mpc import MilpMpcPaper
 from uas_coverage_baselines.milp_mpc.paper_planner import PaperOptions
 
 from uas_coverage_env import World, load_scenario
+from uas_coverage_env.geometry.round_shapes import inner_factor
 from uas_coverage_env.mission import MissionBrief
 from uas_coverage_env.scenario import Scenario
 
@@ -50,10 +52,18 @@ def main(
 
 def both(flat: Scenario, options: PaperOptions, decisions: int, every: int) -> np.ndarray:
     """(D, 2, F) figures of the decisions, in the plane and in space."""
-    planners = {"plane": MilpMpcPaper(options), "space": MilpMpcPaper(options)}
-    for name, planner in planners.items():
-        mission = flat if name == "plane" else flat.model_copy(update={"planar": None})
-        planner.reset(MissionBrief.of(mission), 0)
+    share = inner_factor(options.waypoint_sides, 3) / inner_factor(options.waypoint_sides, 2)
+    circles = tuple(
+        waypoint.model_copy(update={"radius_m": share * waypoint.radius_m})
+        for waypoint in flat.waypoints
+    )
+    missions = {
+        "plane": flat.model_copy(update={"waypoints": circles}),
+        "space": flat.model_copy(update={"planar": None}),
+    }
+    planners = {name: MilpMpcPaper(options) for name in missions}
+    for name, mission in missions.items():
+        planners[name].reset(MissionBrief.of(mission), 0)
     world, rows = World(flat), []
     for step in range((decisions - 1) * every + 1):
         swarm = world.swarm_state()

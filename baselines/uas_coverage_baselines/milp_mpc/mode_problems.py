@@ -36,9 +36,17 @@ class ModeProblems:
         brief: the mission.
         options: of the planner.
         ways: past the fixed obstacles; where None, targets are aimed at straight, as the paper's.
+        farthest: with ways, targets farther than so many horizons of cruising cost no less a metre.
     """
 
-    def __init__(self, brief: MissionBrief, options: ModeOptions, ways: Ways | None = None) -> None:
+    def __init__(
+        self,
+        brief: MissionBrief,
+        options: ModeOptions,
+        ways: Ways | None = None,
+        farthest: float = _FARTHEST,
+    ) -> None:
+        self._farthest = np.inf if ways is None else farthest
         self._options, self._weights = options, options.weights
         self._scale = length_scale(brief.vehicles, brief.dt_s)
         self._choice = TargetChoice(
@@ -46,7 +54,7 @@ class ModeProblems:
             height_scale_m=self._scale * TargetChoice.height_scale_m,
             among_candidates=options.target_scale == "candidates",
         )
-        self._builder, self._leads = ProblemBuilder(brief, options, ways), ways is not None
+        self._builder = ProblemBuilder(brief, options, ways)
         self.blocked: set[int] = set()
         self._planless: dict[str, int] = {}  # the nearest open waypoint of UAS without any plan
         self._memories = {uas.name: ModeMemory() for uas in brief.uas}
@@ -129,7 +137,7 @@ class ModeProblems:
                     self._builder.seconds_home(name, now.position_m),
                     self._builder.horizon_m(name) if level else 0.0,
                     self._weights,
-                    _FARTHEST * self._builder.horizon_m(name) if self._leads else np.inf,
+                    self._farthest * self._builder.horizon_m(name),
                     self._scale,
                 ),
             )

@@ -222,7 +222,9 @@ class MilpMpcPaper:
     def _problems(self, brief: MissionBrief) -> ModeProblems:
         targets = self.options.targets
         routed = targets == "routed" or (targets is None and needs_routes(brief, self.options))
-        return ModeProblems(brief, self.options, Ways(brief) if routed else None)
+        # what is beyond the horizon costs as much a metre as what is at its end: with less, setting
+        # off may cost more than it gains, and a UAS stays
+        return ModeProblems(brief, self.options, Ways(brief) if routed else None, farthest=1.0)
 
     def mode(self, name: str) -> Mode:
         """The operation mode."""
