@@ -91,6 +91,8 @@ class PaperOptions(ModeOptions):
     return_rule: Annotated[Literal["waypoints", "vehicle"] | None, UnlessNone] = with_default(
         ModeOptions, "return_rule", None
     )
+    # the polygon inside the limit of speed takes 8 % (H_P = 8), turns and ways past traffic a tenth
+    return_detour: float = with_default(ModeOptions, "return_detour", 1.2)
     targets: Annotated[Literal["straight", "routed"] | None, UnlessNone] = Field(
         default=None,
         description="how targets are aimed at: straight, as the paper's are, or along the world's "
