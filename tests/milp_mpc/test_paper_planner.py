@@ -21,8 +21,9 @@ from uas_coverage_env.files.strict_toml import InputError
 from uas_coverage_env.flight import Flight, load_planner, rollout
 from uas_coverage_env.flight.metrics import accomplished
 from uas_coverage_env.mission import MissionBrief
+from uas_coverage_env.scenario import load_scenario
 from uas_coverage_env.simulation import World
-from uas_coverage_env.vehicle.layout import VX, VY
+from uas_coverage_env.vehicle.layout import DOD, VX, VY
 from uas_coverage_env.vehicle.params import return_threshold
 from uas_coverage_env.world import Velocity, Wrench
 
@@ -330,3 +331,41 @@ def test_the_vehicles_own_return_rule_can_be_asked_for(planner_class):
         swarm.x[:, 12] = dod
         planner.problem(swarm)
         assert planner.mode("uas_1") == mode
+
+
+@pytest.mark.parametrize(
+    ("rule", "modes"),
+    [
+        (None, ("covering", "return")),
+        ("vehicle", ("return", "return")),
+        ("waypoints", ("covering", "covering")),
+    ],
+)
+def test_who_lands_elsewhere_keeps_back_the_way_there_and_who_comes_back_the_vehicles(rule, modes):
+    there, back = field().uas
+    there = there.model_copy(update={"land_m": (95.0, 95.0, -1.0)})
+    scenario = field().model_copy(update={"uas": (there, back)})
+    planner, swarm = paper(scenario, return_rule=rule), World(scenario).swarm_state()
+    swarm.x[:, DOD] = return_threshold(S500, 0.75) + 0.03
+    planner.problem(swarm)
+    assert tuple(planner.mode(uas.name) for uas in scenario.uas) == modes
+
+
+@pytest.mark.parametrize(
+    ("name", "routed"),
+    [
+        *(("village", False), ("corridor", False), ("open_field", False)),  # as the paper aims
+        *(("indoor", True), ("air_taxi", True), ("walls:2", True)),
+    ],
+)
+def test_targets_are_aimed_at_along_routes_where_a_wall_is_longer_than_the_horizon(name, routed):
+    brief = MissionBrief.of(load_scenario(name))
+    assert paper_planner.needs_routes(brief, MilpMpcPaper.Options()) is routed
+
+
+def test_a_uas_sets_off_for_what_is_farther_than_its_horizon():
+    city = load_scenario("air_taxi")
+    planner = paper(city)
+    problem = first_problem(planner, city).only(0)
+    flown = planner.solved(problem, 0).x[0, :, :2]
+    assert np.hypot(*(flown[-1] - flown[0])) > 500.0

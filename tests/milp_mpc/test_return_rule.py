@@ -28,7 +28,7 @@ def field(low_m, high_m, places, start=START, **fields):
 
 def rule(scenario, detour=1.5, routed=True):
     brief = MissionBrief.of(scenario)
-    return ReturnRule(brief, detour, Ways(brief) if routed else None)
+    return ReturnRule(brief, [detour] * len(brief.uas), Ways(brief) if routed else None)
 
 
 def due_s(threshold):

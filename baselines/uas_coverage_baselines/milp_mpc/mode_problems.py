@@ -21,6 +21,7 @@ from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 from uas_coverage_baselines.milp_mpc.return_rule import ReturnRule
 from uas_coverage_env.entities.commands import HOME, Mode
 from uas_coverage_env.mission import MissionBrief, Ways
+from uas_coverage_env.scenario import Uas
 from uas_coverage_env.vehicle import layout as S
 from uas_coverage_env.vehicle.scale import length_scale
 from uas_coverage_env.world import SwarmState
@@ -35,9 +36,17 @@ class ModeProblems:
         brief: the mission.
         options: of the planner.
         ways: past the fixed obstacles; where None, targets are aimed at straight, as the paper's.
+        farthest: with ways, targets farther than so many horizons of cruising cost no less a metre.
     """
 
-    def __init__(self, brief: MissionBrief, options: ModeOptions, ways: Ways | None = None) -> None:
+    def __init__(
+        self,
+        brief: MissionBrief,
+        options: ModeOptions,
+        ways: Ways | None = None,
+        farthest: float = _FARTHEST,
+    ) -> None:
+        self._farthest = np.inf if ways is None else farthest
         self._options, self._weights = options, options.weights
         self._scale = length_scale(brief.vehicles, brief.dt_s)
         self._choice = TargetChoice(
@@ -45,12 +54,14 @@ class ModeProblems:
             height_scale_m=self._scale * TargetChoice.height_scale_m,
             among_candidates=options.target_scale == "candidates",
         )
-        self._builder, self._leads = ProblemBuilder(brief, options, ways), ways is not None
+        self._builder = ProblemBuilder(brief, options, ways)
         self.blocked: set[int] = set()
         self._planless: dict[str, int] = {}  # the nearest open waypoint of UAS without any plan
         self._memories = {uas.name: ModeMemory() for uas in brief.uas}
-        detour = options.return_detour if options.return_rule == "waypoints" else None
-        self._return_rule = ReturnRule(brief, detour, ways)
+        detours = [
+            options.return_detour if _by_waypoints(options, uas) else None for uas in brief.uas
+        ]
+        self._return_rule = ReturnRule(brief, detours, ways)
         self._beyond: dict[str, frozenset[int]] = {}
 
     def mode(self, name: str) -> Mode:
@@ -126,7 +137,7 @@ class ModeProblems:
                     self._builder.seconds_home(name, now.position_m),
                     self._builder.horizon_m(name) if level else 0.0,
                     self._weights,
-                    _FARTHEST * self._builder.horizon_m(name) if self._leads else np.inf,
+                    self._farthest * self._builder.horizon_m(name),
                     self._scale,
                 ),
             )
@@ -154,6 +165,14 @@ class ModeProblems:
             name: int(open_now[np.linalg.norm(waypoints_m - now.position_m, axis=1).argmin()])
             for name, now in zip(swarm.active, situations, strict=True)
         }
+
+
+def _by_waypoints(options: ModeOptions, uas: Uas) -> bool:
+    """Whether D_r,max of a UAS is the way home by an open waypoint."""
+    if options.return_rule is None:
+        # that of a vehicle is the way back to where it has started, however near that is
+        return uas.home_m != uas.start_m
+    return options.return_rule == "waypoints"
 
 
 def _still_planned(plan: Plan | None) -> dict[str, set[int]]:

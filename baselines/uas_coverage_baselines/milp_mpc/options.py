@@ -35,11 +35,18 @@ def _split(text: Any) -> Any:
 
 
 def _endless(text: Any) -> Any:
-    return None if text in ("none", "inf") else text
+    return None if text == "inf" else _unless_none(text)
+
+
+def _unless_none(text: Any) -> Any:
+    return None if text == "none" else text
 
 
 TimeLimitS = Annotated[float | None, BeforeValidator(_endless)]
 """A limit as it is typed: seconds, or none."""
+
+UnlessNone = BeforeValidator(_unless_none)
+"""Of an option that may be typed as none."""
 
 
 class OcpOptions(PlannerOptions):
@@ -158,9 +165,10 @@ class ModeOptions(OcpOptions):
         le=10.0,
         description="added to a waypoint's weight per second that covering it saves later",
     )
-    return_rule: Literal["waypoints", "vehicle"] = Field(
+    return_rule: Annotated[Literal["waypoints", "vehicle"] | None, UnlessNone] = Field(
         default="waypoints",
-        description="D_r,max: the way home by an open waypoint, or the vehicle file's return_rule",
+        description="D_r,max: the way home by an open waypoint, or the vehicle file's return_rule; "
+        "none: the vehicle's for a UAS that lands where it starts, else by an open waypoint",
     )
     return_detour: float = Field(
         default=1.5,

@@ -10,8 +10,9 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
@@ -23,14 +24,19 @@ from uas_coverage_baselines.milp_mpc.model.ocp import PAPER_OCP, Block
 from uas_coverage_baselines.milp_mpc.model.own_data import with_data
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_baselines.milp_mpc.model.reductions import FORMULATIONS
-from uas_coverage_baselines.milp_mpc.options import ModeOptions, TimeLimitS, with_default
+from uas_coverage_baselines.milp_mpc.options import (
+    ModeOptions,
+    TimeLimitS,
+    UnlessNone,
+    with_default,
+)
 from uas_coverage_baselines.milp_mpc.search.restricted import RestrictedMilp
 from uas_coverage_baselines.milp_mpc.silent_uas import SilentUas
 from uas_coverage_baselines.milp_mpc.solvers import SolverLimits, solver_named
 from uas_coverage_baselines.milp_mpc.solvers.interface import SolverError, SolveStatus
 from uas_coverage_env.entities.commands import Mode
 from uas_coverage_env.flight import Decision
-from uas_coverage_env.mission import MissionBrief, first_sight
+from uas_coverage_env.mission import MissionBrief, Ways, first_sight
 from uas_coverage_env.mission.refusal import refuse_what_asks
 from uas_coverage_env.planning.around.handover import away_of
 from uas_coverage_env.world import Command, SwarmState
@@ -82,8 +88,16 @@ class PaperOptions(ModeOptions):
         default=False, description="whether a plan's end keeps charge for the way home"
     )
     priority_per_s: float = with_default(ModeOptions, "priority_per_s", 0.0)
-    return_rule: Literal["waypoints", "vehicle"] = with_default(
-        ModeOptions, "return_rule", "vehicle"
+    return_rule: Annotated[Literal["waypoints", "vehicle"] | None, UnlessNone] = with_default(
+        ModeOptions, "return_rule", None
+    )
+    # the polygon inside the limit of speed takes 8 % (H_P = 8), turns and ways past traffic a tenth
+    return_detour: float = with_default(ModeOptions, "return_detour", 1.2)
+    targets: Annotated[Literal["straight", "routed"] | None, UnlessNone] = Field(
+        default=None,
+        description="how targets are aimed at: straight, as the paper's are, or along the world's "
+        "routes; none: straight, but where there are doors, or an obstacle up to the ceiling that "
+        "is longer than the horizon reaches",
     )
     return_scale: Literal["horizon", "distance"] = with_default(
         ModeOptions, "return_scale", "distance"
@@ -133,6 +147,7 @@ class SolvedProgram:
         solve_s: and to solve.
         processor_s: of both, all threads.
         status: what came of it.
+        iterations: of the simplex; 0 where the solver does not tell them.
     """
 
     step: int
@@ -145,6 +160,27 @@ class SolvedProgram:
     solve_s: float
     processor_s: float
     status: SolveStatus
+    iterations: int = 0
+
+
+def needs_routes(brief: MissionBrief, options: PaperOptions) -> bool:
+    """Whether a UAS that aims straight at its target may stay before a wall.
+
+    It sees a way round an obstacle only within its horizon: it does not where an obstacle that it
+    cannot fly over is longer than that, nor where walls and doors make rooms.
+    """
+    if len(brief.doors_m):
+        return True
+    farthest_mps = min(vehicle.limits.v_xy_max_mps for vehicle in brief.vehicles)
+    reach_m = options.horizon * brief.dt_s * farthest_mps
+    ceiling_m = brief.fence.vertices_m[:, 2].min()
+    size_m = max(uas.radius_m for uas in brief.uas)
+    for obstacle, hull in zip(brief.obstacles, brief.kept_hulls, strict=True):
+        low, high = hull.vertices_m.min(axis=0), hull.vertices_m.max(axis=0)
+        over_m = low[2] - size_m - obstacle.safe_distance_m
+        if over_m <= ceiling_m and np.hypot(*(high - low)[:2]) > reach_m:
+            return True
+    return False
 
 
 class MilpMpcPaper:
@@ -176,14 +212,21 @@ class MilpMpcPaper:
     def warm_up(self, brief: MissionBrief) -> None:
         """Compile what the first decision compiles, without solving it."""
         refuse_what_asks(brief)
-        ModeProblems(brief, self.options).problem(first_sight(brief), None)
+        self._problems(brief).problem(first_sight(brief), None)
 
     def reset(self, brief: MissionBrief, seed: int) -> None:
         """Start a mission; nothing is random in the planner, so the seed changes nothing."""
         refuse_what_asks(brief)
         self._brief = brief
-        self._by_modes, self._silent_uas = ModeProblems(brief, self.options), SilentUas(brief, 0.0)
+        self._by_modes, self._silent_uas = self._problems(brief), SilentUas(brief, 0.0)
         self.plan = self.last_decision = self.last_program = None
+
+    def _problems(self, brief: MissionBrief) -> ModeProblems:
+        targets = self.options.targets
+        routed = targets == "routed" or (targets is None and needs_routes(brief, self.options))
+        # what is beyond the horizon costs as much a metre as what is at its end: with less, setting
+        # off may cost more than it gains, and a UAS stays
+        return ModeProblems(brief, self.options, Ways(brief) if routed else None, farthest=1.0)
 
     def mode(self, name: str) -> Mode:
         """The operation mode."""
@@ -249,6 +292,7 @@ class MilpMpcPaper:
             solve_s=solution.wall_time_s,
             processor_s=time.process_time() - busy,
             status=solution.status,
+            iterations=solution.iterations,
         )
         if solution.values is None:
             infeasible = solution.status is SolveStatus.INFEASIBLE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,13 +26,15 @@ class ReturnRule:
 
     Args:
         brief: the mission.
-        detour: over the quickest way to a waypoint and home; None: D_r,max is that of the vehicle
-            file, wherever the waypoints are.
+        detours: of each UAS over the quickest way to a waypoint and home; None: D_r,max is that of
+            the vehicle file, wherever the waypoints are.
         ways: past the fixed obstacles; where None, ways are straight.
     """
 
-    def __init__(self, brief: MissionBrief, detour: float | None, ways: Ways | None) -> None:
-        self._detour, self._ways = detour, ways
+    def __init__(
+        self, brief: MissionBrief, detours: Sequence[float | None], ways: Ways | None
+    ) -> None:
+        self._detours, self._ways = tuple(detours), ways
         self._row = {uas.name: row for row, uas in enumerate(brief.uas)}
         self._vehicles = brief.vehicles
         self._settling_s = [settling_s(vehicle, brief.dt_s) for vehicle in brief.vehicles]
@@ -45,16 +49,17 @@ class ReturnRule:
         self._waypoints_m = np.array([w.position_m for w in brief.waypoints], float)
         self._homes_m = np.array([uas.home_m for uas in brief.uas], float)
         self._home_s = np.zeros((len(brief.uas), len(brief.waypoints)))
-        if detour is not None:
-            for uas, home_s in enumerate(self._home_s):
+        for uas, (detour, home_s) in enumerate(zip(self._detours, self._home_s, strict=True)):
+            if detour is not None:
                 home_s[:] = [self._seconds(uas, HOME, place_m) for place_m in self._waypoints_m]
 
     def __str__(self) -> str:
         """What is kept back, in a few words."""
-        if self._detour is None:
+        detours = [detour for detour in self._detours if detour is not None]
+        if not detours:
             return "the vehicle file's return_rule"
         settling_s = max(self._settling_s)
-        return f"{self._detour:g} times the way to a waypoint and home, and {settling_s:g} s"
+        return f"{max(detours):g} times the way to a waypoint and home, and {settling_s:g} s"
 
     def dod_return(self, name: str, position_m: FloatArray, uncovered: BoolArray) -> float:
         """DoD_r of a UAS.
@@ -65,7 +70,7 @@ class ReturnRule:
             uncovered: (K,) the open waypoints.
         """
         uas = self._row[name]
-        if self._detour is None or not uncovered.any():
+        if self._detours[uas] is None or not uncovered.any():
             return return_threshold(self._vehicles[uas], float(self._dod_max[uas]))
         return self._dod_before(uas, self._least_s(uas, position_m, np.flatnonzero(uncovered)))
 
@@ -81,7 +86,7 @@ class ReturnRule:
             uncovered: (K,) the open waypoints.
         """
         uas, open_now = self._row[name], np.flatnonzero(uncovered)
-        if self._detour is None or not len(open_now):
+        if self._detours[uas] is None or not len(open_now):
             return set()
         # by way of home none takes longer
         longest_s = self._seconds(uas, HOME, position_m) + 2.0 * self._home_s[uas, open_now].max()
@@ -95,8 +100,9 @@ class ReturnRule:
 
     def _dod_before(self, uas: int, seconds: float) -> float:
         """The depth of discharge at which so long a flight home is due."""
-        assert self._detour is not None
-        due_s = self._detour * seconds + self._settling_s[uas]
+        detour = self._detours[uas]
+        assert detour is not None
+        due_s = detour * seconds + self._settling_s[uas]
         return float(self._dod_max[uas] - self._dod_per_s[uas] * due_s)
 
     def _least_s(self, uas: int, position_m: FloatArray, waypoints: NDArray[np.intp]) -> float:
