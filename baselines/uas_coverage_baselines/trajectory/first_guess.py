@@ -189,6 +189,7 @@ def _timed(
         top_m[n] = max(top_m[n], top_m[n + 1] - speeds.up / speeds.level * step_m[n])
     for n in range(1, len(top_m)):
         top_m[n] = max(top_m[n], top_m[n - 1] - speeds.down / speeds.level * step_m[n - 1])
+    top_m = np.minimum(top_m, _below_lintels_m(dense, space))
     raised = np.column_stack([dense[:, :2], -top_m])
     at = first[marks]
     dip = -corners[marks, 2] < top_m[at] - deep_m
@@ -242,6 +243,8 @@ def _needed_m(path_m: FloatArray, space: Space) -> FloatArray:
     room_m = np.where(up > 0.1, -outside_m / np.maximum(up, 0.1), np.inf).min(axis=1)
     ceiling_m = -path_m[:, 2] + room_m
     for o, keep_m in enumerate(space.keep_m):
+        if space.has_way_below[o]:
+            continue
         faces = slice(space.first[o], space.first[o + 1])
         normals, offsets_m = space.normals[faces], space.offsets_m[faces]
         near = ((path_m >= space.low_m[o] - keep_m) | (np.arange(3) == 2)) & (
@@ -262,6 +265,19 @@ def _needed_m(path_m: FloatArray, space: Space) -> FloatArray:
         lifted = inside & (roof_m < ceiling_m)
         top_m[lifted] = np.maximum(top_m[lifted], roof_m)
     return top_m
+
+
+def _below_lintels_m(path_m: FloatArray, space: Space) -> FloatArray:
+    """(N+1,) altitudes below which a path leads through doors; inf where there is no lintel."""
+    below_m, under_m = np.full(len(path_m), np.inf), space.length_scale * _OVER_M
+    for o in np.flatnonzero(space.has_way_below):
+        wide_m = space.keep_m[o] + under_m
+        low_m, high_m = space.low_m[o, :2] - wide_m, space.high_m[o, :2] + wide_m
+        near = ((path_m[:, :2] >= low_m) & (path_m[:, :2] <= high_m)).all(axis=1)
+        near[1:] |= near[:-1].copy()
+        near[:-1] |= near[1:].copy()
+        below_m[near] = np.minimum(below_m[near], -space.high_m[o, 2] - wide_m)
+    return below_m
 
 
 def _delayed(guess: Guess, earliest: IntArray) -> Guess:

@@ -324,7 +324,10 @@ class FlightProgram:
         outside_m = path_m @ space.fence_normals.T + space.fence_offsets_m
         result = []
         for h in range(len(space.fence_offsets_m)):
-            stage = np.flatnonzero(outside_m[1:-1, h] > -space.length_scale * _FENCE_NEAR_M) + 1
+            near_m = space.length_scale * _FENCE_NEAR_M
+            if abs(space.fence_normals[h, 2]) > 0.7:
+                near_m = max(near_m, _FENCE_NEAR_M)
+            stage = np.flatnonzero(outside_m[1:-1, h] > -near_m) + 1
             if not len(stage):
                 continue
             # homes may lie in the margin

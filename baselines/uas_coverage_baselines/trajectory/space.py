@@ -22,7 +22,8 @@ IntArray = NDArray[np.int64]
 TALL_M = 1e9
 """Of what nothing passes over or under in a plane [m]."""
 
-_BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it
+_BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it, but
+# for a lintel, below which routes lead
 # at scale 1
 _FENCE_MARGIN_M = 0.1
 _HEIGHT_MARGIN_M = 0.1
@@ -44,6 +45,8 @@ class Space(NamedTuple):
     """(O, 3) box around each hull."""
     high_m: FloatArray
     """(O, 3)"""
+    has_way_below: NDArray[np.bool_]
+    """(O,) whether routes lead below it: a lintel."""
     keep_m: FloatArray
     """(O,) planned distance."""
     least_m: FloatArray
@@ -126,6 +129,7 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         first=np.cumsum([0, *(len(row) for row in rows)]),
         low_m=low_m,
         high_m=obstacles["hull_middle_m"] + obstacles["hull_half_m"],
+        has_way_below=np.ascontiguousarray(obstacles["lintel"]),
         keep_m=least_m + margin_m,
         least_m=least_m,
         fence_normals=np.ascontiguousarray(arena.normals[fence]),
@@ -198,7 +202,7 @@ def _separating(space, o, p, q):
     """The face with most distance to both ends of a segment, and that distance."""
     best_m, face = -np.inf, -1
     for f in range(space.first[o], space.first[o + 1]):
-        if space.normals[f, 2] > _BELOW:
+        if space.normals[f, 2] > _BELOW and not space.has_way_below[o]:
             continue
         distance_m = min(_distance(space, f, p), _distance(space, f, q))
         if distance_m > best_m:
