@@ -42,6 +42,7 @@ _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
 _UNFLOWN_S = 1000.0
 _LEAST_PROGRAMS = 20  # for each of a large fleet, who share those of a small one
+_FULL_S = 1.0  # at shorter samples there is less to be made of a flight at once, in proportion
 HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
 _FINISHED = 0.95  # of a draft's steps: no flight of 60 missions was made shorter than 0.952
 _BATTERY = "the battery does not last"
@@ -73,7 +74,13 @@ class Effort:
 
     @classmethod
     def of(
-        cls, options: TrajectoryOptions, moment: Moment, total_weight: float, *, first: bool
+        cls,
+        options: TrajectoryOptions,
+        moment: Moment,
+        total_weight: float,
+        dt_s: float,
+        *,
+        first: bool,
     ) -> Effort:
         """The effort of a plan.
 
@@ -81,6 +88,7 @@ class Effort:
             options: Of the planner.
             moment: From where.
             total_weight: See the attribute.
+            dt_s: Length of a step.
             first: Whether it is made before take-off; later, the order that is flown is there, too.
         """
         n_uas = len(moment.x)
@@ -90,7 +98,9 @@ class Effort:
             planned = options.planned_orders
         larger = min(max(n_uas * len(moment.uncovered) / _SMALL, 1.0), _LARGER)
         moves = round(larger * options.moves)
-        return cls(orders, planned, moves, options.programs, total_weight, options.threads)
+        least = min(options.programs, _LEAST_PROGRAMS)
+        programs = max(round(options.programs * min(1.0, dt_s / _FULL_S)), least)
+        return cls(orders, planned, moves, programs, total_weight, options.threads)
 
 
 @dataclass(frozen=True)

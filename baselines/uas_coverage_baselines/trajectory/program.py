@@ -34,8 +34,6 @@ TOLERANCE_M = 0.02
 """Soft rows that are violated by less in sum count as kept: margins are larger than this."""
 
 # lengths at scale 1
-_NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
-_FENCE_NEAR_M = 25.0
 _SMALL_M = 2.5  # spheres with a smaller radius are visited less far inside
 _FORGIVEN = 0.8  # share of that by which a visit may miss: it is inside the radius still
 _SLOW_SHARE = 0.97  # of the speed at which a waypoint may be covered
@@ -304,17 +302,14 @@ class FlightProgram:
             most_mps = np.full(len(stages), self.air.speed_mps)
             made.append(_balls(stages, VELOCITY, wind_mps, most_mps, _AIRSPEED_WEIGHT))
         if len(self.space.keep_m):
-            stage, normal, bound = separating_rows(
-                self.space, path_m, self.space.length_scale * _NEAR_M
-            )
-            made.append(_planes(stage, normal, bound))
+            made.append(_planes(*separating_rows(self.space, path_m)))
         if self.space.least_height_m > 0.0:
             made.append(_planes(*height_rows(self.space, path_m)))
         made += self._fence_rows(path_m)
         made += [
             rows
             for body in self.bodies
-            if (rows := _apart(body, path_m, self.space.length_scale * _NEAR_M)) is not None
+            if (rows := _apart(body, path_m, self.space.near_m)) is not None
         ]
         # joined, copies of one row are stored by columns: a layout that kernels are compiled for
         return SoftRows(*(np.ascontiguousarray(np.concatenate(p)) for p in zip(*made, strict=True)))
@@ -324,10 +319,7 @@ class FlightProgram:
         outside_m = path_m @ space.fence_normals.T + space.fence_offsets_m
         result = []
         for h in range(len(space.fence_offsets_m)):
-            near_m = space.length_scale * _FENCE_NEAR_M
-            if abs(space.fence_normals[h, 2]) > 0.7:
-                near_m = max(near_m, _FENCE_NEAR_M)
-            stage = np.flatnonzero(outside_m[1:-1, h] > -near_m) + 1
+            stage = np.flatnonzero(outside_m[1:-1, h] > -space.fence_near_m[h]) + 1
             if not len(stage):
                 continue
             # homes may lie in the margin

@@ -24,7 +24,11 @@ TALL_M = 1e9
 
 _BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it, but
 # for a lintel, below which routes lead
+_NEAR_AT_LEAST_M = 2.5  # of what is planned round, however small the vehicle: between two guesses
+# a flight moves as far as its rooms let it, and walls may be thinner than a step is long
 # at scale 1
+_NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
+_FENCE_NEAR_M = 25.0
 _FENCE_MARGIN_M = 0.1
 _HEIGHT_MARGIN_M = 0.1
 _ZONE_SIDES = 8
@@ -57,6 +61,10 @@ class Space(NamedTuple):
     """(H,) a place is inside, with margin, where `normal . p + offset <= 0`."""
     fence_margin_m: float
     """Of the plan, in addition to that of the rules."""
+    fence_near_m: FloatArray
+    """(H,) a face that is farther gets no rows."""
+    near_m: float
+    """What is farther than this beyond its distance gets no rows."""
     length_scale: float
     """See `vehicle.scale`."""
     least_height_m: float
@@ -114,6 +122,10 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
     faces = np.concatenate([np.zeros(0, np.int64), *rows])
     least_m = float(arena.uas[uas]["radius_m"]) + obstacles["safe_distance_m"]
     fence = slice(int(rules["fence_first"]), int(rules["fence_last"]))
+    scale = float(rules["length_scale"])
+    # height costs next to nothing: without floor and ceiling a flight drifts far beyond them
+    level = (np.abs(arena.normals[fence, 2]) > _BELOW) & (not planar)
+    fence_near_m = np.where(level, max(scale, 1.0), scale) * _FENCE_NEAR_M
     height_m = 0.0 if planar else float(rules["min_height_m"])
     # over roofs, what the distance to keep leaves of the least height raises the upper faces
     upward = np.maximum(-arena.normals[faces, 2], 0.0)
@@ -135,7 +147,9 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         fence_normals=np.ascontiguousarray(arena.normals[fence]),
         fence_offsets_m=arena.offsets_m[fence] + float(rules["fence_margin_m"]),
         fence_margin_m=min(_FENCE_MARGIN_M, margin_m),
-        length_scale=float(rules["length_scale"]),
+        fence_near_m=fence_near_m,
+        near_m=max(scale * _NEAR_M, _NEAR_AT_LEAST_M),
+        length_scale=scale,
         least_height_m=height_m,
         zone_middles_m=np.array([arena.uas[uas][end][:2] for end in ("home_m", "start_m")], float),
         zone_m=float(rules["landing_zone_m"]),
@@ -211,13 +225,12 @@ def _separating(space, o, p, q):
 
 
 @allocating_kernel
-def separating_rows(space, path_m, near_m):
+def separating_rows(space, path_m):
     """Planes that separate both ends of each step from each obstacle near it.
 
     Args:
         space: `Space` of the UAS.
         path_m: (N+1, 3) flight so far.
-        near_m: Obstacles farther than this beyond what is kept get no row.
 
     Returns:
         Stages (m,), normals (m, 3) and bounds (m,) of rows `normal . p <= bound`.
@@ -225,7 +238,7 @@ def separating_rows(space, path_m, near_m):
     n_obstacles, n_steps = len(space.keep_m), len(path_m) - 1
     stage, normal, bound = [0], [(0.0, 0.0, 0.0)], [0.0]
     for o in range(n_obstacles):
-        reach_m = space.keep_m[o] + near_m
+        reach_m = space.keep_m[o] + space.near_m
         for n in range(n_steps):
             if _is_far(space, o, path_m[n], path_m[n + 1], reach_m):
                 continue
