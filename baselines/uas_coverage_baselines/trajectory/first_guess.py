@@ -54,9 +54,24 @@ class Speeds(NamedTuple):
 
 
 def first_flight(
-    program: FlightProgram, terrain: Terrain, uas: int, start: FloatArray, route: IntArray
+    program: FlightProgram,
+    terrain: Terrain,
+    uas: int,
+    start: FloatArray,
+    route: IntArray,
+    most_steps: float = np.inf,
 ) -> Work[PlannedFlight]:
-    """A flight along a route that violates nothing, however slow; else what violates least."""
+    """A flight along a route that violates nothing, however slow; else what violates least.
+
+    Args:
+        program: Of the UAS.
+        terrain: Of the mission.
+        uas: Index of the UAS.
+        start: (10,) state.
+        route: (K,) waypoints.
+        most_steps: After so much work no other way is tried, in steps of flights looked for.
+    """
+    left = most_steps
     best: PlannedFlight | None = None
     limits = program.model
     tries = [(slower, 0.0, False) for slower in _SLOWER]
@@ -64,6 +79,8 @@ def first_flight(
         tries += [(_SLOWER[1], wait_s, False) for wait_s in _WAITS_S]
     tries += [(slower, 0.0, True) for slower in (*_SLOWER, _SLOWEST)]
     for slower, wait_s, dips in tries:
+        if left <= 0.0 and best is not None:
+            break
         speeds = Speeds(
             _CRUISE * slower * float(limits.norms[0]),
             _CLIMB * float(limits.vertical[0]),
@@ -76,8 +93,10 @@ def first_flight(
             guess = _waiting(guess, start, max(round(wait_s / limits.dt_s), 1))
         flight = program.solve(start, route, guess.visits, guess.path_m, rounds=4)
         yield flight.steps
+        left -= flight.steps
         if np.isfinite(flight.violation):
-            flight = yield from _mended(program, start, route, flight)
+            mended = _mended(program, start, route, flight, left)
+            flight, left = yield from mended
         if flight.is_clear:
             return flight
         if best is None or flight.violation < best.violation:
@@ -87,27 +106,31 @@ def first_flight(
 
 
 def _mended(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight
-) -> Work[PlannedFlight]:
-    """Visits moved where they are missed, until nothing is violated or nothing helps."""
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight, left: float
+) -> Work[tuple[PlannedFlight, float]]:
+    """Visits moved where they are missed, until nothing is violated or helps; and work left."""
     for _ in range(_MENDS):
         missed = np.flatnonzero(flight.missed_m > 0.02)
         if flight.is_clear or len(missed) > _MOST_MISSED:
-            return flight
+            break
         for k in missed:
             for by in (1, 2, -1):
+                if left <= 0.0:
+                    return flight, left
                 visits = flight.visits.copy()
                 visits[k] = min(max(visits[k] + by, 1), flight.steps - 1)
                 new = program.solve(start, route, visits, flight.x, flight.u)
                 yield new.steps
+                left -= new.steps
                 if new.violation < flight.violation - 1e-3:
                     flight = new
                     break
         visits = deepest_visits(program, flight, route)
         new = program.solve(start, route, visits, flight.x, flight.u)
         yield new.steps
+        left -= new.steps
         flight = new if new.violation < flight.violation else flight
-    return flight
+    return flight, left
 
 
 def deepest_visits(program: FlightProgram, flight: PlannedFlight, route: IntArray) -> IntArray:

@@ -251,6 +251,13 @@ class FlightProgram:
             spare = min(spare, float(gap))
         return spare
 
+    def first_meeting(self, path_m: FloatArray) -> int:
+        """The first step of a path (N+1, 3) that is too near to a body; N where none is."""
+        for n in range(len(path_m) - 1):
+            if self.spare_from_bodies_m(path_m[: n + 2]) < 0.0:
+                return n
+        return len(path_m) - 1
+
     def visits_all(self, route: IntArray, flight: PlannedFlight) -> bool:
         """Whether a flight passes through all spheres, whatever else it violates."""
         return bool(self._is_visited(route, flight.missed_m).all())

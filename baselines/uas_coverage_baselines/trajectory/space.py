@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel
 from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
 from uas_coverage_env.world import Arena
 
@@ -193,14 +193,14 @@ def spare_height_m(space: Space, path_m: FloatArray) -> float:
     return float((-outside[:, 2] - space.planned_height_m).min(initial=np.inf))
 
 
-@allocating_kernel
+@inlined_kernel
 def _distance(space, f, p):
     """Signed distance of a point from face f."""
     faces = space.normals
     return faces[f, 0] * p[0] + faces[f, 1] * p[1] + faces[f, 2] * p[2] + space.offsets_m[f]
 
 
-@allocating_kernel
+@inlined_kernel
 def _is_far(space, o, p, q, beyond_m):
     """Whether a segment stays out of an obstacle's box widened by a distance."""
     for axis in range(3):
