@@ -54,9 +54,24 @@ class Speeds(NamedTuple):
 
 
 def first_flight(
-    program: FlightProgram, terrain: Terrain, uas: int, start: FloatArray, route: IntArray
+    program: FlightProgram,
+    terrain: Terrain,
+    uas: int,
+    start: FloatArray,
+    route: IntArray,
+    most_steps: float = np.inf,
 ) -> Work[PlannedFlight]:
-    """A flight along a route that violates nothing, however slow; else what violates least."""
+    """A flight along a route that violates nothing, however slow; else what violates least.
+
+    Args:
+        program: Of the UAS.
+        terrain: Of the mission.
+        uas: Index of the UAS.
+        start: (10,) state.
+        route: (K,) waypoints.
+        most_steps: After so much work no other way is tried, in steps of flights looked for.
+    """
+    left = most_steps
     best: PlannedFlight | None = None
     limits = program.model
     tries = [(slower, 0.0, False) for slower in _SLOWER]
@@ -64,6 +79,8 @@ def first_flight(
         tries += [(_SLOWER[1], wait_s, False) for wait_s in _WAITS_S]
     tries += [(slower, 0.0, True) for slower in (*_SLOWER, _SLOWEST)]
     for slower, wait_s, dips in tries:
+        if left <= 0.0 and best is not None:
+            break
         speeds = Speeds(
             _CRUISE * slower * float(limits.norms[0]),
             _CLIMB * float(limits.vertical[0]),
@@ -76,8 +93,10 @@ def first_flight(
             guess = _waiting(guess, start, max(round(wait_s / limits.dt_s), 1))
         flight = program.solve(start, route, guess.visits, guess.path_m, rounds=4)
         yield flight.steps
+        left -= flight.steps
         if np.isfinite(flight.violation):
-            flight = yield from _mended(program, start, route, flight)
+            mended = _mended(program, start, route, flight, left)
+            flight, left = yield from mended
         if flight.is_clear:
             return flight
         if best is None or flight.violation < best.violation:
@@ -87,27 +106,31 @@ def first_flight(
 
 
 def _mended(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight
-) -> Work[PlannedFlight]:
-    """Visits moved where they are missed, until nothing is violated or nothing helps."""
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight, left: float
+) -> Work[tuple[PlannedFlight, float]]:
+    """Visits moved where they are missed, until nothing is violated or helps; and work left."""
     for _ in range(_MENDS):
         missed = np.flatnonzero(flight.missed_m > 0.02)
         if flight.is_clear or len(missed) > _MOST_MISSED:
-            return flight
+            break
         for k in missed:
             for by in (1, 2, -1):
+                if left <= 0.0:
+                    return flight, left
                 visits = flight.visits.copy()
                 visits[k] = min(max(visits[k] + by, 1), flight.steps - 1)
                 new = program.solve(start, route, visits, flight.x, flight.u)
                 yield new.steps
+                left -= new.steps
                 if new.violation < flight.violation - 1e-3:
                     flight = new
                     break
         visits = deepest_visits(program, flight, route)
         new = program.solve(start, route, visits, flight.x, flight.u)
         yield new.steps
+        left -= new.steps
         flight = new if new.violation < flight.violation else flight
-    return flight
+    return flight, left
 
 
 def deepest_visits(program: FlightProgram, flight: PlannedFlight, route: IntArray) -> IntArray:
@@ -189,6 +212,7 @@ def _timed(
         top_m[n] = max(top_m[n], top_m[n + 1] - speeds.up / speeds.level * step_m[n])
     for n in range(1, len(top_m)):
         top_m[n] = max(top_m[n], top_m[n - 1] - speeds.down / speeds.level * step_m[n - 1])
+    top_m = np.minimum(top_m, _below_lintels_m(dense, space))
     raised = np.column_stack([dense[:, :2], -top_m])
     at = first[marks]
     dip = -corners[marks, 2] < top_m[at] - deep_m
@@ -242,6 +266,8 @@ def _needed_m(path_m: FloatArray, space: Space) -> FloatArray:
     room_m = np.where(up > 0.1, -outside_m / np.maximum(up, 0.1), np.inf).min(axis=1)
     ceiling_m = -path_m[:, 2] + room_m
     for o, keep_m in enumerate(space.keep_m):
+        if space.has_way_below[o]:
+            continue
         faces = slice(space.first[o], space.first[o + 1])
         normals, offsets_m = space.normals[faces], space.offsets_m[faces]
         near = ((path_m >= space.low_m[o] - keep_m) | (np.arange(3) == 2)) & (
@@ -262,6 +288,19 @@ def _needed_m(path_m: FloatArray, space: Space) -> FloatArray:
         lifted = inside & (roof_m < ceiling_m)
         top_m[lifted] = np.maximum(top_m[lifted], roof_m)
     return top_m
+
+
+def _below_lintels_m(path_m: FloatArray, space: Space) -> FloatArray:
+    """(N+1,) altitudes below which a path leads through doors; inf where there is no lintel."""
+    below_m, under_m = np.full(len(path_m), np.inf), space.length_scale * _OVER_M
+    for o in np.flatnonzero(space.has_way_below):
+        wide_m = space.keep_m[o] + under_m
+        low_m, high_m = space.low_m[o, :2] - wide_m, space.high_m[o, :2] + wide_m
+        near = ((path_m[:, :2] >= low_m) & (path_m[:, :2] <= high_m)).all(axis=1)
+        near[1:] |= near[:-1].copy()
+        near[:-1] |= near[1:].copy()
+        below_m[near] = np.minimum(below_m[near], -space.high_m[o, 2] - wide_m)
+    return below_m
 
 
 def _delayed(guess: Guess, earliest: IntArray) -> Guess:

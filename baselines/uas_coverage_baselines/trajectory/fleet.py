@@ -47,6 +47,7 @@ _ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
 _TRACKING_ALLOWANCE = Allowance(inside_m=0.25, landing_distance=0.8, landing_speed=0.5)
 _WIDER_M = 0.3  # tracking keeps of obstacles beyond the distance of plans, where it can; at scale 1
 _LATER_STEPS = 12  # to make way for another
+_WAITS_S = (0.0, 3.0, 8.0)  # to let pass what moves
 
 
 @dataclass(frozen=True)
@@ -245,6 +246,9 @@ class Fleet:
         budget: int,
         known: Mapping[tuple[int, bytes], PlannedFlight],
         threads: int = 1,
+        *,
+        first_steps: float = np.inf,
+        bends: bool = False,
     ) -> dict[int, Draft]:
         """A flight of each UAS alone, to be finished by `flights`.
 
@@ -255,10 +259,17 @@ class Fleet:
             budget: Programs to solve for each, about.
             known: Flights by UAS and route that need no search where they still may be flown.
             threads: UAS planned side by side; the flights are the same.
+            first_steps: Work on each first flight at most, in steps of flights looked for.
+            bends: Whether known flights make way for what moves, rather than being planned anew.
         """
 
         def begun(u: int) -> Draft:
-            return done(self.draft(moment, u, routes[u], moving[u], budget, known))
+            return done(
+                self.draft(
+                    moment, u, routes[u], moving[u], budget, known,
+                    first_steps=first_steps, bends=bends,
+                )
+            )  # fmt: skip
 
         with ThreadPoolExecutor(threads) as side_by_side:  # the solver frees the GIL
             return dict(zip(routes, side_by_side.map(begun, routes), strict=True))
@@ -271,6 +282,9 @@ class Fleet:
         moving: Sequence[Body],
         budget: int,
         known: Mapping[tuple[int, bytes], PlannedFlight],
+        *,
+        first_steps: float = np.inf,
+        bends: bool = False,
     ) -> Work[Draft]:
         """One of the `drafts`."""
         program = self.program(uas, {}, moving, _earliest(moment))
@@ -278,7 +292,11 @@ class Fleet:
         if same is not None and program.allows(route, same):
             return Draft(same, 0)
         start = reduced_state(moment.x[uas])
-        return (yield from draft(program, self.terrain, uas, start, route, budget))
+        if same is not None and bends:
+            bent = yield from put_off(program, start, route, same)
+            if bent.is_clear:
+                return Draft(bent, budget)
+        return (yield from draft(program, self.terrain, uas, start, route, budget, first_steps))
 
     def flights(
         self,
@@ -331,6 +349,23 @@ def _asked(brief: MissionBrief) -> Asked | None:
     speeds_mps = np.array([w.max_speed_mps or np.inf for w in waypoints], float)
     nothing = np.isinf(heights_m).all() and np.isinf(speeds_mps).all()
     return None if nothing else Asked(heights_m, speeds_mps)
+
+
+def put_off(
+    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight
+) -> Work[PlannedFlight]:
+    """The flight beside what moves: bent, or waiting before it; else as far as that succeeds."""
+    for wait_s in _WAITS_S:
+        steps = round(wait_s / program.model.dt_s)
+        order, lengths = stretches(flight)
+        meets = program.first_meeting(flight.path_m)
+        into = int(np.searchsorted(np.cumsum(lengths), meets))
+        visits = shifted(flight.visits, order, min(into, len(order)), steps)
+        new = retimed(program, start, route, flight, visits, flight.steps + steps, rounds=4)
+        yield new.steps
+        if new.is_clear:
+            return new
+    return new
 
 
 def make_way(

@@ -42,6 +42,8 @@ _ONE_SEARCH = 8  # from more UAS on, one order is searched before take-off
 _SMALL, _LARGER = 250, 6  # UAS times waypoints; beyond, more changes are tried, so much at most
 _UNFLOWN_S = 1000.0
 _LEAST_PROGRAMS = 20  # for each of a large fleet, who share those of a small one
+_FULL_S = 1.0  # at shorter samples a decision searches less, in proportion, and takes what is there
+_FIRST_STEPS = 10_000  # there, work on a flight that violates nothing, in steps
 HOPELESS = 1.02  # times the cheapest order: flights differ from what orders expect by 1.4 %
 _FINISHED = 0.95  # of a draft's steps: no flight of 60 missions was made shorter than 0.952
 _BATTERY = "the battery does not last"
@@ -62,6 +64,9 @@ class Effort:
         programs: Solved for each flight, about.
         total_weight: Worth of a second of each UAS's flight against one of the mission.
         threads: Searches made, and UAS planned for, side by side.
+        first_steps: Work on each first flight at most, in steps of flights looked for.
+        bends: Whether known flights in the way of what moves are bent or delayed, not planned anew,
+            and another order is flown only where it costs clearly less.
     """
 
     orders: int
@@ -70,10 +75,18 @@ class Effort:
     programs: int
     total_weight: float
     threads: int = 1
+    first_steps: float = np.inf
+    bends: bool = False
 
     @classmethod
     def of(
-        cls, options: TrajectoryOptions, moment: Moment, total_weight: float, *, first: bool
+        cls,
+        options: TrajectoryOptions,
+        moment: Moment,
+        total_weight: float,
+        dt_s: float,
+        *,
+        first: bool,
     ) -> Effort:
         """The effort of a plan.
 
@@ -81,6 +94,7 @@ class Effort:
             options: Of the planner.
             moment: From where.
             total_weight: See the attribute.
+            dt_s: Length of a step.
             first: Whether it is made before take-off; later, the order that is flown is there, too.
         """
         n_uas = len(moment.x)
@@ -90,7 +104,14 @@ class Effort:
             planned = options.planned_orders
         larger = min(max(n_uas * len(moment.uncovered) / _SMALL, 1.0), _LARGER)
         moves = round(larger * options.moves)
-        return cls(orders, planned, moves, options.programs, total_weight, options.threads)
+        if dt_s >= _FULL_S:
+            return cls(orders, planned, moves, options.programs, total_weight, options.threads)
+        share = dt_s / _FULL_S
+        programs = max(round(share * options.programs), min(options.programs, _LEAST_PROGRAMS))
+        return cls(
+            orders, planned, round(share * moves), programs, total_weight, options.threads,
+            first_steps=_FIRST_STEPS, bends=not first,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -231,6 +252,8 @@ def _best_plan(
         if orders[0].trips:  # flights of now alone do not tell which order is cheaper
             orders = orders[:1]
         for order in orders:
+            if effort.bends and best is not None and not best.troubles:
+                break
             if problem.n_uas > SMALL_FLEET and order.cost_s > HOPELESS * orders[0].cost_s:
                 break
             key = tuple(route.tobytes() for route in order.routes)
@@ -282,7 +305,10 @@ def _orders(
     begin = empty_routes(problem.n_uas) if kept is None else kept
     searches = [(search(k), seed + k) for k in range(effort.orders)]
     found += search_orders(problem, begin, searches, fresh, effort.threads)
-    return sorted(found, key=lambda order: order.cost_s)
+    cheapest_first = sorted(found, key=lambda order: order.cost_s)
+    if effort.bends and kept is not None and found[0].cost_s < HOPELESS * cheapest_first[0].cost_s:
+        return found  # flights along what is flown are known
+    return cheapest_first
 
 
 def _flown(
@@ -301,7 +327,10 @@ def _flown(
     """
     routes = _routes(moment, order, step)
     programs = _programs(effort, len(routes))
-    drafts = fleet.drafts(moment, routes, moving, programs, known, effort.threads)
+    drafts = fleet.drafts(
+        moment, routes, moving, programs, known, effort.threads,
+        first_steps=effort.first_steps, bends=effort.bends,
+    )  # fmt: skip
     if best is not None and _least_s(fleet, effort, order, drafts) >= best.cost_s:
         return None
     alone = fleet.flights(moment, routes, moving, drafts, effort.threads)

@@ -34,8 +34,6 @@ TOLERANCE_M = 0.02
 """Soft rows that are violated by less in sum count as kept: margins are larger than this."""
 
 # lengths at scale 1
-_NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
-_FENCE_NEAR_M = 25.0
 _SMALL_M = 2.5  # spheres with a smaller radius are visited less far inside
 _FORGIVEN = 0.8  # share of that by which a visit may miss: it is inside the radius still
 _SLOW_SHARE = 0.97  # of the speed at which a waypoint may be covered
@@ -253,6 +251,13 @@ class FlightProgram:
             spare = min(spare, float(gap))
         return spare
 
+    def first_meeting(self, path_m: FloatArray) -> int:
+        """The first step of a path (N+1, 3) that is too near to a body; N where none is."""
+        for n in range(len(path_m) - 1):
+            if self.spare_from_bodies_m(path_m[: n + 2]) < 0.0:
+                return n
+        return len(path_m) - 1
+
     def visits_all(self, route: IntArray, flight: PlannedFlight) -> bool:
         """Whether a flight passes through all spheres, whatever else it violates."""
         return bool(self._is_visited(route, flight.missed_m).all())
@@ -304,17 +309,14 @@ class FlightProgram:
             most_mps = np.full(len(stages), self.air.speed_mps)
             made.append(_balls(stages, VELOCITY, wind_mps, most_mps, _AIRSPEED_WEIGHT))
         if len(self.space.keep_m):
-            stage, normal, bound = separating_rows(
-                self.space, path_m, self.space.length_scale * _NEAR_M
-            )
-            made.append(_planes(stage, normal, bound))
+            made.append(_planes(*separating_rows(self.space, path_m)))
         if self.space.least_height_m > 0.0:
             made.append(_planes(*height_rows(self.space, path_m)))
         made += self._fence_rows(path_m)
         made += [
             rows
             for body in self.bodies
-            if (rows := _apart(body, path_m, self.space.length_scale * _NEAR_M)) is not None
+            if (rows := _apart(body, path_m, self.space.near_m)) is not None
         ]
         # joined, copies of one row are stored by columns: a layout that kernels are compiled for
         return SoftRows(*(np.ascontiguousarray(np.concatenate(p)) for p in zip(*made, strict=True)))
@@ -324,7 +326,7 @@ class FlightProgram:
         outside_m = path_m @ space.fence_normals.T + space.fence_offsets_m
         result = []
         for h in range(len(space.fence_offsets_m)):
-            stage = np.flatnonzero(outside_m[1:-1, h] > -space.length_scale * _FENCE_NEAR_M) + 1
+            stage = np.flatnonzero(outside_m[1:-1, h] > -space.fence_near_m[h]) + 1
             if not len(stage):
                 continue
             # homes may lie in the margin

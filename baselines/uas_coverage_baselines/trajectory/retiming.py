@@ -111,6 +111,7 @@ def draft(
     start: FloatArray,
     route: IntArray,
     budget: int,
+    first_steps: float = np.inf,
 ) -> Work[Draft]:
     """A flight along a route, as short as all its stretches may be made at once.
 
@@ -121,13 +122,15 @@ def draft(
         start: (10,) state.
         route: (K,) waypoints.
         budget: Programs to solve, about, fewer for long flights; the first flight is not counted.
+        first_steps: Work on that at most, in steps of flights looked for.
     """
-    flight = yield from first_flight(program, terrain, uas, start, route)
+    flight = yield from first_flight(program, terrain, uas, start, route, first_steps)
     if not flight.is_clear:
         return Draft(flight, 0)
     # one program of a long flight takes as long as several of a short one
     until = program.solved + round(budget * min(1.0, _LONG_STEPS / flight.steps))
-    flight = yield from _coarse(program, start, route, flight, until)
+    most = until if np.isfinite(first_steps) else np.inf
+    flight = yield from _coarse(program, start, route, flight, until, most)
     return Draft(flight, until - program.solved)
 
 
@@ -140,9 +143,17 @@ def finished(
 
 
 def _coarse(
-    program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight, until: int
+    program: FlightProgram,
+    start: FloatArray,
+    route: IntArray,
+    flight: PlannedFlight,
+    until: int,
+    most: float,
 ) -> Work[PlannedFlight]:
-    """All stretches shorter at once; those in which time is dear get their steps back."""
+    """All stretches shorter at once; those in which time is dear get their steps back.
+
+    No attempt is begun after `until` programs, nor gone on with after `most`.
+    """
     share, frozen = _FIRST_SHARE, np.zeros(len(route) + 1, bool)
     while share > _LAST_SHARE and program.solved < until:
         order, lengths = stretches(flight)
@@ -151,14 +162,14 @@ def _coarse(
         less = np.maximum(np.minimum(less, lengths - 1), 0)
         new = None
         for _ in range(6):
-            if less.sum() == 0:
+            if less.sum() == 0 or program.solved >= most:
                 break
             ends = np.cumsum(lengths - less)
             visits = flight.visits.copy()
             visits[order] = ends[:-1]
             new = retimed(program, start, route, flight, visits, int(ends[-1]))
             yield new.steps
-            if not new.is_clear and new.violation < _MENDABLE:
+            if not new.is_clear and new.violation < _MENDABLE and program.solved < most:
                 new = yield from repair(program, start, route, new, 3)
             if new.is_clear:
                 break

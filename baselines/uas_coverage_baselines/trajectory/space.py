@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_env.compiled.kernels import allocating_kernel
+from uas_coverage_env.compiled.kernels import allocating_kernel, inlined_kernel
 from uas_coverage_env.geometry.segments import cylinder_clearance, segment_clearance
 from uas_coverage_env.world import Arena
 
@@ -22,8 +22,13 @@ IntArray = NDArray[np.int64]
 TALL_M = 1e9
 """Of what nothing passes over or under in a plane [m]."""
 
-_BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it
+_BELOW = 0.7  # a face whose normal points down by more than this has the ground behind it, but
+# for a lintel, below which routes lead
+_NEAR_AT_LEAST_M = 2.5  # of what is planned round, however small the vehicle: between two guesses
+# a flight moves as far as its rooms let it, and walls may be thinner than a step is long
 # at scale 1
+_NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
+_FENCE_NEAR_M = 25.0
 _FENCE_MARGIN_M = 0.1
 _HEIGHT_MARGIN_M = 0.1
 _ZONE_SIDES = 8
@@ -44,6 +49,8 @@ class Space(NamedTuple):
     """(O, 3) box around each hull."""
     high_m: FloatArray
     """(O, 3)"""
+    has_way_below: NDArray[np.bool_]
+    """(O,) whether routes lead below it: a lintel."""
     keep_m: FloatArray
     """(O,) planned distance."""
     least_m: FloatArray
@@ -54,6 +61,10 @@ class Space(NamedTuple):
     """(H,) a place is inside, with margin, where `normal . p + offset <= 0`."""
     fence_margin_m: float
     """Of the plan, in addition to that of the rules."""
+    fence_near_m: FloatArray
+    """(H,) a face that is farther gets no rows."""
+    near_m: float
+    """What is farther than this beyond its distance gets no rows."""
     length_scale: float
     """See `vehicle.scale`."""
     least_height_m: float
@@ -111,6 +122,10 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
     faces = np.concatenate([np.zeros(0, np.int64), *rows])
     least_m = float(arena.uas[uas]["radius_m"]) + obstacles["safe_distance_m"]
     fence = slice(int(rules["fence_first"]), int(rules["fence_last"]))
+    scale = float(rules["length_scale"])
+    # height costs next to nothing: without floor and ceiling a flight drifts far beyond them
+    level = (np.abs(arena.normals[fence, 2]) > _BELOW) & (not planar)
+    fence_near_m = np.where(level, max(scale, 1.0), scale) * _FENCE_NEAR_M
     height_m = 0.0 if planar else float(rules["min_height_m"])
     # over roofs, what the distance to keep leaves of the least height raises the upper faces
     upward = np.maximum(-arena.normals[faces, 2], 0.0)
@@ -126,12 +141,15 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         first=np.cumsum([0, *(len(row) for row in rows)]),
         low_m=low_m,
         high_m=obstacles["hull_middle_m"] + obstacles["hull_half_m"],
+        has_way_below=np.ascontiguousarray(obstacles["lintel"]),
         keep_m=least_m + margin_m,
         least_m=least_m,
         fence_normals=np.ascontiguousarray(arena.normals[fence]),
         fence_offsets_m=arena.offsets_m[fence] + float(rules["fence_margin_m"]),
         fence_margin_m=min(_FENCE_MARGIN_M, margin_m),
-        length_scale=float(rules["length_scale"]),
+        fence_near_m=fence_near_m,
+        near_m=max(scale * _NEAR_M, _NEAR_AT_LEAST_M),
+        length_scale=scale,
         least_height_m=height_m,
         zone_middles_m=np.array([arena.uas[uas][end][:2] for end in ("home_m", "start_m")], float),
         zone_m=float(rules["landing_zone_m"]),
@@ -175,14 +193,14 @@ def spare_height_m(space: Space, path_m: FloatArray) -> float:
     return float((-outside[:, 2] - space.planned_height_m).min(initial=np.inf))
 
 
-@allocating_kernel
+@inlined_kernel
 def _distance(space, f, p):
     """Signed distance of a point from face f."""
     faces = space.normals
     return faces[f, 0] * p[0] + faces[f, 1] * p[1] + faces[f, 2] * p[2] + space.offsets_m[f]
 
 
-@allocating_kernel
+@inlined_kernel
 def _is_far(space, o, p, q, beyond_m):
     """Whether a segment stays out of an obstacle's box widened by a distance."""
     for axis in range(3):
@@ -198,7 +216,7 @@ def _separating(space, o, p, q):
     """The face with most distance to both ends of a segment, and that distance."""
     best_m, face = -np.inf, -1
     for f in range(space.first[o], space.first[o + 1]):
-        if space.normals[f, 2] > _BELOW:
+        if space.normals[f, 2] > _BELOW and not space.has_way_below[o]:
             continue
         distance_m = min(_distance(space, f, p), _distance(space, f, q))
         if distance_m > best_m:
@@ -207,13 +225,12 @@ def _separating(space, o, p, q):
 
 
 @allocating_kernel
-def separating_rows(space, path_m, near_m):
+def separating_rows(space, path_m):
     """Planes that separate both ends of each step from each obstacle near it.
 
     Args:
         space: `Space` of the UAS.
         path_m: (N+1, 3) flight so far.
-        near_m: Obstacles farther than this beyond what is kept get no row.
 
     Returns:
         Stages (m,), normals (m, 3) and bounds (m,) of rows `normal . p <= bound`.
@@ -221,7 +238,7 @@ def separating_rows(space, path_m, near_m):
     n_obstacles, n_steps = len(space.keep_m), len(path_m) - 1
     stage, normal, bound = [0], [(0.0, 0.0, 0.0)], [0.0]
     for o in range(n_obstacles):
-        reach_m = space.keep_m[o] + near_m
+        reach_m = space.keep_m[o] + space.near_m
         for n in range(n_steps):
             if _is_far(space, o, path_m[n], path_m[n + 1], reach_m):
                 continue
