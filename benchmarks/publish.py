@@ -30,6 +30,7 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from glob import glob
 from pathlib import Path
 from threading import Lock
 from typing import Annotated, Any
@@ -60,7 +61,8 @@ class Figures(StrictModel):
     quick: str = ""
     """The command of `--quick`; default: the same."""
     fill: tuple[str, ...] = ()
-    """Commands that fill pages from `{out}`; `{command}` is the one above, `{checkout}` a folder.
+    """Commands that fill pages from `{out}`; `{command}` is the one above, `{checkout}` a folder, and
+    `*` is as in a shell.
     Default: what the command writes to stdout goes between its only mark."""
     marks: tuple[str, ...] = ()
     """Between which it stands on pages."""
@@ -205,6 +207,7 @@ class Checkout:
             "COLUMNS": "400",  # no cell of a table is broken
         }
         program, *words = shlex.split(command)
+        words = [each for word in words for each in self._expanded(word)]
         if program == "python":
             words[0] = str(self.folder / words[0])
         else:
@@ -225,6 +228,10 @@ class Checkout:
             _, status, spent = os.wait4(process.pid, 0)
             process.returncode = os.waitstatus_to_exitcode(status)
         return process.returncode, spent.ru_utime + spent.ru_stime
+
+    def _expanded(self, word: str) -> list[str]:
+        """The files and folders for which a word with a star stands, as in a shell."""
+        return (sorted(glob(word, root_dir=self.out)) if "*" in word else []) or [word]
 
     def make(self, name: str, figures: Figures) -> bool:
         """Make some figures and publish them, if they are not there; whether they are there now."""
