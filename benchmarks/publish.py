@@ -61,9 +61,9 @@ class Figures(StrictModel):
     quick: str = ""
     """The command of `--quick`; default: the same."""
     fill: tuple[str, ...] = ()
-    """Commands that fill pages from `{out}`; `{command}` is the one above, `{checkout}` a folder, and
-    `*` is as in a shell.
-    Default: what the command writes to stdout goes between its only mark."""
+    """Commands that fill pages from `{out}`; `{command}` is the one above, `{checkout}` a folder,
+    and `*` is as in a shell. Default: what the command
+    writes to stdout goes between its only mark."""
     marks: tuple[str, ...] = ()
     """Between which it stands on pages."""
     alone: bool = False
