@@ -347,7 +347,7 @@ def lines_that_name(figures: Iterable[Figures], root: Path) -> list[str]:
         for _, _, between in (each for each in places(root) if each[0] == page):
             text = text.replace(between, "\n" * between.count("\n"))
         for number, line in enumerate(text.splitlines(), start=1):
-            if any(f"`{command}" in line for command in commands):
+            if any(command in line for command in commands):
                 found.append(f"{page.relative_to(root)}:{number}")
     return found
 
