@@ -30,6 +30,7 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from glob import glob
 from pathlib import Path
 from threading import Lock
 from typing import Annotated, Any
@@ -60,8 +61,9 @@ class Figures(StrictModel):
     quick: str = ""
     """The command of `--quick`; default: the same."""
     fill: tuple[str, ...] = ()
-    """Commands that fill pages from `{out}`; `{command}` is the one above, `{checkout}` a folder.
-    Default: what the command writes to stdout goes between its only mark."""
+    """Commands that fill pages from `{out}`; `{command}` is the one above, `{checkout}` a folder,
+    and `*` is as in a shell. Default: what the command
+    writes to stdout goes between its only mark."""
     marks: tuple[str, ...] = ()
     """Between which it stands on pages."""
     alone: bool = False
@@ -205,6 +207,7 @@ class Checkout:
             "COLUMNS": "400",  # no cell of a table is broken
         }
         program, *words = shlex.split(command)
+        words = [each for word in words for each in self._expanded(word)]
         if program == "python":
             words[0] = str(self.folder / words[0])
         else:
@@ -225,6 +228,10 @@ class Checkout:
             _, status, spent = os.wait4(process.pid, 0)
             process.returncode = os.waitstatus_to_exitcode(status)
         return process.returncode, spent.ru_utime + spent.ru_stime
+
+    def _expanded(self, word: str) -> list[str]:
+        """The files and folders for which a word with a star stands, as in a shell."""
+        return (sorted(glob(word, root_dir=self.out)) if "*" in word else []) or [word]
 
     def make(self, name: str, figures: Figures) -> bool:
         """Make some figures and publish them, if they are not there; whether they are there now."""
@@ -340,7 +347,7 @@ def lines_that_name(figures: Iterable[Figures], root: Path) -> list[str]:
         for _, _, between in (each for each in places(root) if each[0] == page):
             text = text.replace(between, "\n" * between.count("\n"))
         for number, line in enumerate(text.splitlines(), start=1):
-            if any(f"`{command}" in line for command in commands):
+            if any(command in line for command in commands):
                 found.append(f"{page.relative_to(root)}:{number}")
     return found
 

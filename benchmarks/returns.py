@@ -273,9 +273,9 @@ def main(
         f"{len(times)} returns ({dynamics}, {level or 'still'}) "
         f"from {min(ways_m):.0f} to {max(ways_m):.0f} m away"
     )
-    console.print(_table("time: flown less estimated [s]", columns, np.array(times), 1))
+    console.print(_table("time: flown less estimated, s", columns, np.array(times), 1))
     console.print(
-        _table("depth of discharge: flown less estimated [%]", columns, np.array(charges), 2)
+        _table("depth of discharge: flown less estimated, %", columns, np.array(charges), 2)
     )
     short = (np.array(times)[:, 1] > 0.0) | (np.array(charges)[:, 1] > 0.0)
     raise typer.Exit(0 if short.mean() < _ALLOWED else 1)

@@ -168,6 +168,20 @@ def test_files_that_a_command_writes_are_copied_and_later_ones_find_them(project
     assert set(kept["files"]) == {"docs/picture.txt"}
 
 
+def test_a_star_stands_for_what_a_command_has_made(project, tmp_path, monkeypatch):
+    figures = publish.figures_in()
+    fill = ("python benchmarks/one.py", "python benchmarks/count.py {out}/*")
+    several = figures["one"].model_copy(update={"fill": fill, "marks": ()})
+    monkeypatch.setattr(publish, "figures_in", lambda: {"one": several})
+    (project / "benchmarks" / "count.py").write_text("import sys\nprint(sys.argv[1:])\n")
+    committed(project)
+    out = tmp_path / "out"
+    for name in ("b", "a"):
+        (out / "one" / name).mkdir(parents=True)
+    run(out)
+    assert (out / "one.fill.txt").read_text() == "['one/a', 'one/b']\n"
+
+
 def flown_with_files(project, tmp_path) -> dict:
     with (project / "benchmarks" / "one.py").open("a") as script:
         script.write(
