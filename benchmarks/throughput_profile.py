@@ -14,7 +14,7 @@ from rich.table import Table
 
 from uas_coverage_env.env import CoverageBatch
 from uas_coverage_env.env.batch.kernel import block_parts_with
-from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP, lanes_at_once
+from uas_coverage_env.env.batch.memory import FLY, NEXT_STEP
 from uas_coverage_env.env.episode.observe import blocks_of_looks
 from uas_coverage_env.env.episode.step import stages_with
 from uas_coverage_env.env.versions import V0
@@ -54,7 +54,7 @@ class _Parts:
         self._before = np.zeros_like(self.observation)
         batch.missions.settled[:] = False
         self._given = batch.call.numbers
-        self._n = lanes_at_once(n_lanes, batch.n_uas, 1)
+        self._n = batch.call.at_once
         self._parts = block_parts_with(V0, self.observation.shape[2])
         blocks = blocks_of_looks(V0.observation)
         looks = ["nearest waypoints", *(", ".join(each.name for each in group) for group in blocks)]

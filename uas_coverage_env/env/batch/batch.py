@@ -137,7 +137,7 @@ class CoverageBatch:
         begins_later = self._begins_here and self.autoreset == SAME_STEP
         ends = DISABLED if begins_later else self.autoreset
         self.call = BatchCall(
-            self.settings, self.pool, self.missions, self._observing, ends, int(threads)
+            self.settings, self.pool, self.missions, self._observing, ends, int(threads), at_once
         )
 
     @property

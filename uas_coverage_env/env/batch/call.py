@@ -16,7 +16,7 @@ from uas_coverage_env.env.batch.kernel import (
     step_batch,
     step_batch_in_threads,
 )
-from uas_coverage_env.env.batch.memory import Missions, lanes_at_once
+from uas_coverage_env.env.batch.memory import Missions
 from uas_coverage_env.env.batch.source import LaneMissions
 from uas_coverage_env.env.episode.act import acting_of, is_own
 from uas_coverage_env.env.episode.memory import Observing
@@ -36,6 +36,7 @@ class BatchCall:
         observing: What is observed.
         autoreset: NEXT_STEP, SAME_STEP, DISABLED or WAITS.
         threads: How many of numba's threads share the lanes.
+        at_once: See `lanes_at_once`; `missions` has scratch for as many of each thread.
     """
 
     def __init__(
@@ -46,12 +47,12 @@ class BatchCall:
         observing: Observing,
         autoreset: int,
         threads: int,
+        at_once: int,
     ) -> None:
         self._settings, self._pool, self._missions = settings, pool, missions
         self._observing, self._autoreset, self._threads = observing, autoreset, threads
-        num_envs, n_uas = missions.settled.shape
-        self._at_once = lanes_at_once(num_envs, n_uas, threads)
-        self._by_scene = np.arange(num_envs)
+        self.at_once = at_once
+        self._by_scene = np.arange(len(missions.settled))
         self._kernel: Callable[..., int] | None = None
         self._block = 0
         self._given: tuple[Given, NDArray[np.int64]] | None = None
@@ -81,7 +82,7 @@ class BatchCall:
             version = self._settings.version
             self._block = block_code(version, self._settings.observation_size)
         given = (
-            numbers, orders, self._by_scene, self._at_once, self._autoreset, self._block,
+            numbers, orders, self._by_scene, self.at_once, self._autoreset, self._block,
             before, observation,
         )  # fmt: skip
         if self._kernel is None:

@@ -64,14 +64,20 @@ def _away_m2(columns, w, x, y, z):
 
 
 @inlined_kernel
+def _is_open_within(north_m, east_m, down_m, uncovered, w, x, y, z, limit_m2):
+    """Whether a waypoint is open and no farther than a limit."""
+    dx = north_m[w] - x
+    dy = east_m[w] - y
+    dz = down_m[w] - z
+    return uncovered[w] & (dx * dx + dy * dy + dz * dz <= limit_m2)
+
+
+@inlined_kernel
 def _open_within(north_m, east_m, down_m, uncovered, x, y, z, limit_m2):
     """The open waypoints no farther than a limit, as the bits of a number."""
     bits = 0
     for w in range(uncovered.shape[0]):
-        dx = north_m[w] - x
-        dy = east_m[w] - y
-        dz = down_m[w] - z
-        near = uncovered[w] & (dx * dx + dy * dy + dz * dz <= limit_m2)
+        near = _is_open_within(north_m, east_m, down_m, uncovered, w, x, y, z, limit_m2)
         bits |= np.int64(near) << w
     return bits
 
@@ -133,10 +139,7 @@ def _n_open_within(north_m, east_m, down_m, uncovered, x, y, z, limit_m2):
     """How many open waypoints are no farther than a limit."""
     n = 0
     for w in range(uncovered.shape[0]):
-        dx = north_m[w] - x
-        dy = east_m[w] - y
-        dz = down_m[w] - z
-        n += uncovered[w] & (dx * dx + dy * dy + dz * dz <= limit_m2)
+        n += _is_open_within(north_m, east_m, down_m, uncovered, w, x, y, z, limit_m2)
     return n
 
 
