@@ -47,7 +47,7 @@ _ALLOWANCE = Allowance(inside_m=0.4, landing_distance=0.7, landing_speed=0.4)
 _TRACKING_ALLOWANCE = Allowance(inside_m=0.25, landing_distance=0.8, landing_speed=0.5)
 _WIDER_M = 0.3  # tracking keeps of obstacles beyond the distance of plans, where it can; at scale 1
 _LATER_STEPS = 12  # to make way for another
-_WAITS_S = (0.0, 3.0, 8.0)  # to let pass what moves
+_WAITS_S, _BEFORE_S = (3.0, 8.0), 1.5  # to let pass what moves; so long before it would be met
 
 
 @dataclass(frozen=True)
@@ -354,17 +354,20 @@ def _asked(brief: MissionBrief) -> Asked | None:
 def put_off(
     program: FlightProgram, start: FloatArray, route: IntArray, flight: PlannedFlight
 ) -> Work[PlannedFlight]:
-    """The flight beside what moves: bent, or waiting before it; else as far as that succeeds."""
-    for wait_s in _WAITS_S:
-        steps = round(wait_s / program.model.dt_s)
-        order, lengths = stretches(flight)
-        meets = program.first_meeting(flight.path_m)
-        into = int(np.searchsorted(np.cumsum(lengths), meets))
-        visits = shifted(flight.visits, order, min(into, len(order)), steps)
-        new = retimed(program, start, route, flight, visits, flight.steps + steps, rounds=4)
+    """A known flight beside what moves: bent, or after a wait before it; else the last attempt."""
+    dt_s, path_m = program.model.dt_s, flight.path_m
+    meets = program.first_meeting(path_m)
+    soon = max(meets - round(_BEFORE_S / dt_s), 0)
+    visited = int(flight.visits[flight.visits <= soon].max(initial=0))
+    new = flight
+    for wait_s, at in ((0.0, soon), *((wait_s, k) for wait_s in _WAITS_S for k in (soon, visited))):
+        steps = round(wait_s / dt_s)
+        waiting_m = np.insert(path_m, at, np.repeat(path_m[at : at + 1], steps, axis=0), axis=0)
+        visits = np.where(flight.visits > at, flight.visits + steps, flight.visits)
+        new = program.solve(start, route, visits, waiting_m)
         yield new.steps
         if new.is_clear:
-            return new
+            break
     return new
 
 
