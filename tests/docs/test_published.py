@@ -231,8 +231,10 @@ def test_a_command_that_is_another_now_is_flown_again(project, tmp_path, monkeyp
     assert faults_of(results(project), project, publish.figures_in()) == [
         "one: has another command than published.toml"
     ]
+    (out / "one").mkdir()
     run(out, only="one")
     assert (out / "again").read_text() == "11"
+    assert not (out / "one").exists()  # what another command has begun
     assert faults_of(results(project), project, publish.figures_in()) == []
 
 
