@@ -251,12 +251,17 @@ class Checkout:
         sys.stderr.write(f"{name}: some {figures.minutes:g} minutes; {self.out / name}.log\n")
         began_s = time.monotonic()
         command = self._command(name, figures)
+        asked = self.out / f"{name}.asked"
+        source = figures.source(self.quick)
+        if asked.exists() and asked.read_text("utf-8") != source:
+            shutil.rmtree(self.out / name, ignore_errors=True)  # begun by another command
+        asked.write_text(source, "utf-8")
         code, spent_s = self.run(command, self.out / f"{name}.txt")
         if code:
             sys.stderr.write(f"error: {name}: ended with {code}; see {self.out / name}.log\n")
             return False
         done = {
-            "source": figures.source(self.quick),
+            "source": source,
             "command": command,
             "minutes": round((time.monotonic() - began_s) / 60.0, 1),
             "processor_minutes": None if spent_s is None else round(spent_s / 60.0, 2),

@@ -34,6 +34,9 @@ def test_commands_say_where_their_results_go_and_run_here():
         for command in (figures.command, figures.quick, *figures.fill):
             program = command.partition(" ")[0]
             assert program in ("", "python", "uas-coverage", "{command}"), name
+            labels = set(re.findall(r"--(?:option|vary) ([a-z-]+):", command))
+            flown = re.search(r"--planners (\S+)", command)
+            assert labels <= set(flown[1].split(",") if flown else ()), name
             if program == "python":
                 assert (publish.ROOT / command.split()[1]).exists(), name
         if figures.fill:
@@ -228,8 +231,10 @@ def test_a_command_that_is_another_now_is_flown_again(project, tmp_path, monkeyp
     assert faults_of(results(project), project, publish.figures_in()) == [
         "one: has another command than published.toml"
     ]
+    (out / "one").mkdir()
     run(out, only="one")
     assert (out / "again").read_text() == "11"
+    assert not (out / "one").exists()  # what another command has begun
     assert faults_of(results(project), project, publish.figures_in()) == []
 
 
