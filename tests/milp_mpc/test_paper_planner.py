@@ -365,7 +365,9 @@ def test_targets_are_aimed_at_along_routes_where_a_wall_is_longer_than_the_horiz
 
 def test_a_uas_sets_off_for_what_is_farther_than_its_horizon():
     city = load_scenario("air_taxi")
-    planner = paper(city)
-    problem = first_problem(planner, city).only(0)
+    planner, swarm = paper(city), World(city).swarm_state()
+    planner.act(swarm)  # covers nothing: from the next decision on there is a target
+    problem = planner.problem(swarm).only(0)
+    assert planner.mode("taxi_1") == "transit"
     flown = planner.solved(problem, 0).x[0, :, :2]
     assert np.hypot(*(flown[-1] - flown[0])) > 500.0
