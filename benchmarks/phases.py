@@ -67,10 +67,12 @@ def main(
                 (f["accomplished"], len(f["violations"]), f["breaches"], f["fallbacks"], f["steps"],
                  f["energy_Wh"], 100 * f["min_soc_share"], f["decision_processor_s"]["max"])
             )  # fmt: skip
-        found = np.array(rows, float)
-        spread = [f"{np.median(c):.3g} ({c.min():.3g} to {c.max():.3g})" for c in found[:, 4:].T]
-        sums = found[:, :4].sum(axis=0).astype(int).tolist()
-        table.add_row(name, f"{sums[0]} of {len(rows)}", *map(str, sums[1:]), *spread)
+        accomplished, *counts = map(sum, list(zip(*rows, strict=True))[:4])
+        spread = [
+            f"{np.median(c):.3g} ({min(c):.3g} to {max(c):.3g})"
+            for c in list(zip(*rows, strict=True))[4:]
+        ]
+        table.add_row(name, f"{accomplished} of {len(rows)}", *map(str, counts), *spread)
     Console(width=150).print(table)
 
 

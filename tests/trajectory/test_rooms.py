@@ -1,4 +1,4 @@
-"""`trajectory` between walls: below lintels in space, and at the short samples of small vehicles."""
+"""`trajectory` between walls: below lintels in space, and at short samples."""
 
 from functools import cache
 
@@ -73,7 +73,7 @@ def test_a_guess_stays_below_the_lintel_beside_what_it_passes_over():
     program = fleet.programs[0]
     space = program.space
     speeds = Speeds(1.0, 0.8, 0.5)
-    high_m = np.array([10.2, 16.0, -2.2])  # it begins above the door's height
+    high_m = np.array([11.5, 14.6, -2.3])  # where it is before the door is above the lintel
     guess = guess_path(program, fleet.terrain, 0, high_m, THROUGH[1:], speeds)
     near = np.hypot(*(guess.path_m[:, :2] - DOOR_M).T) < 0.2
     assert near.any()
@@ -87,6 +87,17 @@ def test_the_first_flight_through_a_door_needs_one_guess():
     assert flight.is_clear
     assert program.solved <= 4
     assert (-flight.path_m[:, 2]).max() < 2.0
+
+
+def test_what_stands_below_a_flight_drives_it_through_no_ceiling():
+    scenario = office()
+    table = tuple(o for o in scenario.obstacles if o.name == "table")
+    scenario = scenario.model_copy(update={"obstacles": table, "doors_m": ()})
+    fleet, swarm = fleet_of(scenario, margins_in(MissionBrief.of(scenario), None, None).fixed_m)
+    program = fleet.program(1, {}, ())
+    flight = done(first_flight(program, fleet.terrain, 1, start_of(swarm, 1), np.array([0, 1])))
+    assert flight.is_clear
+    assert program.solved == 1
 
 
 def test_flights_keep_to_the_rooms_of_their_ways():

@@ -34,6 +34,7 @@ TOLERANCE_M = 0.02
 """Soft rows that are violated by less in sum count as kept: margins are larger than this."""
 
 # lengths at scale 1
+_FENCE_NEAR_M = 25.0  # what is farther than this beyond its distance gets no rows
 _SMALL_M = 2.5  # spheres with a smaller radius are visited less far inside
 _FORGIVEN = 0.8  # share of that by which a visit may miss: it is inside the radius still
 _SLOW_SHARE = 0.97  # of the speed at which a waypoint may be covered
@@ -326,7 +327,7 @@ class FlightProgram:
         outside_m = path_m @ space.fence_normals.T + space.fence_offsets_m
         result = []
         for h in range(len(space.fence_offsets_m)):
-            stage = np.flatnonzero(outside_m[1:-1, h] > -space.fence_near_m[h]) + 1
+            stage = np.flatnonzero(outside_m[1:-1, h] > -space.length_scale * _FENCE_NEAR_M) + 1
             if not len(stage):
                 continue
             # homes may lie in the margin

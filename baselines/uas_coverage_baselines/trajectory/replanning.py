@@ -83,9 +83,7 @@ class Replanning:
         moment = Moment(swarm.x, flying, swarm.uncovered, self._earliest(swarm, opens, 0),
                         swarm.time_s)  # fmt: skip
         unknown = (opens >= NEVER) & swarm.uncovered
-        effort = Effort.of(
-            self._options, moment, self.total_weight, fleet.brief.dt_s, first=first
-        )
+        effort = Effort.of(self._options, moment, self.total_weight, fleet.brief.dt_s, first=first)
         latest_visit = np.full(len(unknown), NEVER)
         waiting = choose_waiting(fleet, self._way_home, moment, unknown)
         if unknown.any():

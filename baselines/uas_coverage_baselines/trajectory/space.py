@@ -28,7 +28,6 @@ _NEAR_AT_LEAST_M = 2.5  # of what is planned round, however small the vehicle: b
 # a flight moves as far as its rooms let it, and walls may be thinner than a step is long
 # at scale 1
 _NEAR_M = 16.0  # what is farther than this beyond its distance gets no rows
-_FENCE_NEAR_M = 25.0
 _FENCE_MARGIN_M = 0.1
 _HEIGHT_MARGIN_M = 0.1
 _ZONE_SIDES = 8
@@ -61,8 +60,6 @@ class Space(NamedTuple):
     """(H,) a place is inside, with margin, where `normal . p + offset <= 0`."""
     fence_margin_m: float
     """Of the plan, in addition to that of the rules."""
-    fence_near_m: FloatArray
-    """(H,) a face that is farther gets no rows."""
     near_m: float
     """What is farther than this beyond its distance gets no rows."""
     length_scale: float
@@ -123,9 +120,6 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
     least_m = float(arena.uas[uas]["radius_m"]) + obstacles["safe_distance_m"]
     fence = slice(int(rules["fence_first"]), int(rules["fence_last"]))
     scale = float(rules["length_scale"])
-    # height costs next to nothing: without floor and ceiling a flight drifts far beyond them
-    level = (np.abs(arena.normals[fence, 2]) > _BELOW) & (not planar)
-    fence_near_m = np.where(level, max(scale, 1.0), scale) * _FENCE_NEAR_M
     height_m = 0.0 if planar else float(rules["min_height_m"])
     # over roofs, what the distance to keep leaves of the least height raises the upper faces
     upward = np.maximum(-arena.normals[faces, 2], 0.0)
@@ -147,7 +141,6 @@ def space_of(arena: Arena, uas: int, margin_m: float) -> Space:
         fence_normals=np.ascontiguousarray(arena.normals[fence]),
         fence_offsets_m=arena.offsets_m[fence] + float(rules["fence_margin_m"]),
         fence_margin_m=min(_FENCE_MARGIN_M, margin_m),
-        fence_near_m=fence_near_m,
         near_m=max(scale * _NEAR_M, _NEAR_AT_LEAST_M),
         length_scale=scale,
         least_height_m=height_m,
