@@ -65,10 +65,6 @@ VARIANTS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "same-noise": ("noise 0.3 throughout", "learning.phases.*.noise=[0.3, 0.3]"),
         "no-potentials": ("no potential to waypoints or home", *_POTENTIALS),
         "no-scorer": ("velocities are outputs, no scorer", "learning.width=0"),
-        "charged-first": (
-            "most batteries are full in the first phase",
-            "learning.phases.0.lessons={charged=0.75, near=0.25}",
-        ),
     },
 }
 """Learner -> variant -> its meaning, and what is other than shipped, as `--set` takes it."""
