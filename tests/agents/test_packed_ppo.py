@@ -155,7 +155,7 @@ def test_choices_are_drawn_in_flight_as_often_as_learned_and_by_what_is_observed
     assert np.ptp(best({"observation": rows, "action_mask": mask})) == 0
 
 
-def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
+def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them(monkeypatch):
     settings = tiny("ppo-waypoint", "learning.n_steps=40")
     learner = made(settings)
     missions = learner._begun(learner._own.phases[0], 0)
@@ -167,7 +167,7 @@ def test_rows_hold_decisions_alone_and_an_end_is_the_last_of_them():
         actions[:, 0] = HOME_CHOICE  # lands at once, then waits for the other
         return step(actions)
 
-    batch.step = noted
+    monkeypatch.setattr(batch, "step", noted)
     flown = packed._Flown(missions, learner._own)
     rows = flown.collect(learner._model, 1.0)
     flew = np.array(flew)
@@ -192,7 +192,8 @@ def test_advantages_look_ahead_to_an_end_and_not_beyond():
     rewards = np.array([[1.0], [2.0], [4.0]], np.float32)
     values = np.array([[0.5], [0.25], [8.0], [3.0]], np.float32)
     ended = np.array([[False], [True], [False]])
-    found = advantages_of(*map(torch.from_numpy, (rewards, values, ended)), 0.5, 0.5)[:, 0]
+    of_torch = [torch.from_numpy(each) for each in (rewards, values, ended)]
+    found = advantages_of(of_torch[0], of_torch[1], of_torch[2], 0.5, 0.5)[:, 0]
     last = 4.0 + 0.5 * 3.0 - 8.0
     second = 2.0 - 0.25
     first = 1.0 + 0.5 * 0.25 - 0.5 + 0.25 * second

@@ -5,6 +5,7 @@ Run as a program, with NUMBA_ENABLE_CUDASIM=1 and NUMBA_DISABLE_JIT=1: see
 """
 
 import json
+from unittest.mock import patch
 
 import numpy as np
 from uas_coverage_agents.training import packed
@@ -50,7 +51,7 @@ def compared(name):
 
 
 if __name__ == "__main__":
-    packed.AUTORESET = "next_step"  # as on a GPU
     # the simulator starts a thread of the processor for each of a block
     missions_on_gpu.THREADS_PER_BLOCK = N_MISSIONS
-    print(json.dumps({name: compared(name) for name in ("ppo-waypoint", "ppo-velocity")}))
+    with patch.object(packed, "AUTORESET", "next_step"):  # as on a GPU
+        print(json.dumps({name: compared(name) for name in ("ppo-waypoint", "ppo-velocity")}))
