@@ -7,9 +7,11 @@ import pytest
 from toy_problems import box, moving, state, toy
 from uas_coverage_baselines.milp_mpc.fallback import evasion as evasive_flights
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
+from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
+from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
-from uas_coverage_env.vehicle.layout import VX, VZ
+from uas_coverage_env.vehicle.layout import THETA, VX, VZ, WY
 
 HERE = (100.0, 100.0, -20.0)
 STEPS = 24  # 10 s of a direction, and braking
@@ -205,3 +207,23 @@ def test_two_uas_that_are_too_near_part_though_nothing_moves():
     assert np.maximum(level_m, up_m)[-1] >= 6.0
     above = (HERE, (100.0, 100.0, -26.5))
     assert evasion(coming(at=above, separation_m=6.0), 1.0) is None
+
+
+def test_a_uas_in_mid_manoeuvre_goes_on_with_its_backup_while_another_evades():
+    problem = coming(FROM_THE_WEST, at=(HERE, np.add(HERE, (90.0, 0.0, 0.0))))
+    # about to turn at full tilt: the inner loop cannot take over without going beyond its limits
+    limits = problem.vehicles[1].limits
+    x0 = problem.x0.copy()
+    x0[1, [VX, THETA, WY]] = -0.9 * limits.v_xy_max_mps, limits.tilt_max_rad, limits.rate_max_radps
+    problem = dataclasses.replace(problem, x0=x0)
+    braking = evasion(problem, 1.0)
+    assert exceeds_limits(problem.vehicles[1], problem.norm_bounds[1], braking.x[1, 1:])
+    # what the decision before has planned for it levels out, and hovers then
+    steps = 3
+    x = np.repeat(x0[:, None], steps + 1, axis=1)
+    x[:, 1:, [VX, THETA, WY]] = 0.0
+    covers = np.zeros((2, steps, problem.n_scenario_waypoints), bool)
+    backup = Plan(problem.names, x, np.zeros((2, steps, 5)), covers, 0.0, -np.inf)
+    plan = evasion(problem, 1.0, backup)
+    assert np.array_equal(plan.x[1, : steps + 1], x[1])
+    assert np.linalg.norm(plan.x[0, -1, :3] - HERE) > CLEARANCE_M, "the other makes way"

@@ -155,7 +155,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         if reason is not None:
             plan = backup = self._backup
             if backup is None or not still_holds(problem, backup, self.blocks):
-                plan = backup = evasion(problem, self.dt_s)
+                plan = backup = evasion(problem, self.dt_s, backup)
         renewed = () if reason or plan is None else plan.renewed
         followed = self._follower.apply(
             problem, swarm, backup, renewed, {name: to for name, (to, _) in overruled.items()}
