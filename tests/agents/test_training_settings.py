@@ -103,7 +103,7 @@ def test_a_change_reaches_one_table_of_a_list_or_all_of_them():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("learning.phases.3.noise=[1.0, 1.0]", "there is no table '3'"),
+        ("learning.phases.2.noise=[1.0, 1.0]", "there is no table '2'"),
         ("learning.phases.last.noise=[1.0, 1.0]", "there is no table 'last'"),
         ("learning.phases.*.noise.0=1.0", "noise is a list; give it as a whole"),
     ],

@@ -80,8 +80,7 @@ class Pointing(StrictModel):
 
     For each of these there is a score, and a mean action: the way to it (its first leg past
     obstacles), shortened to each of `REACHES_M`, times a speed for each; a height, and one more
-    within the first of the reaches. Added to all is the rest, which alone is anywhere; it fades
-    within the first of the reaches of home, so that the way home ends there, and not beside it.
+    within the first of the reaches. Added to all is the rest, which alone is anywhere.
 
     Attributes:
         home: Direction (north, east) of the first leg home.
@@ -360,9 +359,7 @@ class Actor(StrictModel):
         heights = named[..., first:near] + within[0] * named[..., near:]
         towards = maths.concatenate([on_straight_line(maths, level, slope), heights], -1)
         anywhere = 0.0 * towards[..., :1, :]
-        rest = others[..., None, m + 1 :]
-        at_home = towards[..., -1:, :] + (1.0 - within[0][..., -1:, :]) * rest
-        means = maths.concatenate([towards[..., :-1, :] + rest, at_home, anywhere + rest], -2)
+        means = maths.concatenate([towards, anywhere], -2) + others[..., None, m + 1 :]
         there = (each[..., : len(columns)] != 0.0).any(-1)
         scores = maths.where(there, scored[..., 0], _NEVER)
         scores = maths.concatenate([scores, others[..., [0, m]]], -1)

@@ -18,10 +18,6 @@ _AT_FIRST = 0.1
 _SPEEDS = (0.8, 0.5)
 """Velocities begin with these, within each of `REACHES_M`: some 5 m/s, less from 10 m on."""
 
-_HIGH = 0.25
-"""Velocities to a place begin with this height, 19 m on levels: over low houses, past which no way
-leads (`world.obstacles.overfly_limit`)."""
-
 _LOW = -1.5
 """Home begins with this height near its end: so low that noise does not keep a UAS from landing."""
 
@@ -68,14 +64,13 @@ class ActorCritic(nn.Module):
                 self._point_at_first()
 
     def _point_at_first(self) -> None:
-        """Fly there at some speed and height; seldom home, and low when near; no more is given."""
+        """Fly there at some speed; seldom home, and low when near; no other numbers are given."""
         (first, near), end = self.network.heights_at, self.network.per_candidate
         speeds = torch.tensor(_SPEEDS)
         self.score.bias[1:first] = speeds
         self.others.bias[1:first] = speeds
         self.others.bias[0] = self.others.bias[end] = _SELDOM
-        self.score.bias[first:near] = self.others.bias[first:near] = _HIGH
-        self.others.bias[near:end] = _LOW - _HIGH
+        self.others.bias[near:end] = _LOW
 
     def read(self, observed: Tensor) -> tuple[Tensor, Tensor | None]:
         """What a forward pass reads of the observations of some rows, where they lie."""
