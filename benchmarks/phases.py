@@ -55,7 +55,7 @@ def main(
     table = Table("planner", "accomplished", "contacts, limits", "breaches", "fallbacks", "steps",
                   "Wh", "least charge, %", "longest decision, s")  # fmt: skip
     for name in planners:
-        rows = []
+        counts, measured = [], []
         for phase, seed in track(pairs, name):
             planner = load_planner(name)
             takes_filter = True if hasattr(planner, "assistants") else None
@@ -63,16 +63,15 @@ def main(
                 at_phase(mission, phase / phases), planner, seed, safety_filter=takes_filter
             )
             f = flight.figures
-            rows.append(
-                (f["accomplished"], len(f["violations"]), f["breaches"], f["fallbacks"], f["steps"],
-                 f["energy_Wh"], 100 * f["min_soc_share"], f["decision_processor_s"]["max"])
-            )  # fmt: skip
-        accomplished, *counts = map(sum, list(zip(*rows, strict=True))[:4])
+            counts.append((f["accomplished"], len(f["violations"]), f["breaches"], f["fallbacks"]))
+            longest_s = f["decision_processor_s"]["max"]
+            measured.append((f["steps"], f["energy_Wh"], 100 * f["min_soc_share"], longest_s))
+        accomplished, *sums = map(sum, zip(*counts, strict=True))
         spread = [
             f"{np.median(c):.3g} ({min(c):.3g} to {max(c):.3g})"
-            for c in list(zip(*rows, strict=True))[4:]
+            for c in zip(*measured, strict=True)
         ]
-        table.add_row(name, f"{accomplished} of {len(rows)}", *map(str, counts), *spread)
+        table.add_row(name, f"{accomplished} of {len(pairs)}", *map(str, sums), *spread)
     Console(width=150).print(table)
 
 
