@@ -116,7 +116,7 @@ class FlownMissions:
         """Fly on.
 
         Args:
-            decided: (L, U) for whom there is an action; others have no effect.
+            decided: (L, U) which UAS the actions are of; the others have none.
             actions: (N,) choices or (N, numbers), of these one after the other.
 
         Raises:
