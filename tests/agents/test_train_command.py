@@ -237,3 +237,18 @@ def test_a_checkpoint_that_was_put_there_by_another_is_refused(trained, tmp_path
     err = capsys.readouterr().err
     assert "cannot be read" in err
     assert err.count("\n") == 1
+
+
+def test_a_training_does_not_go_on_with_a_class_that_was_edited(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(curve, "write", curve.write_table)
+    own = tmp_path / "my_own_ppo.py"
+    own.write_text("from stable_baselines3 import PPO\n\n\nclass Mine(PPO):\n    pass\n")
+    again = ["train", "my_own_ppo:Mine", "--scenario", "easy", *USUAL, "--baselines", "none"]
+    again += ["--out", "run"]
+    assert main(again) == 0
+    assert main(again) == 0  # nothing has changed
+    own.write_text(own.read_text() + "\n    learning_rate = 1.0\n")
+    capsys.readouterr()
+    assert main(again) == 2
+    assert "holds another training: modules: my_own_ppo is" in capsys.readouterr().err

@@ -24,7 +24,7 @@ def object_named(kind: str, name: str) -> Any:
     module_name, _, attribute = name.partition(":")
     if not all(part.isidentifier() for part in (*module_name.split("."), attribute)):
         raise InputError(f"{kind} {name!r} is no MODULE:CLASS")
-    with _current_folder():
+    with current_folder():
         try:
             module = importlib.import_module(module_name)
         except ModuleNotFoundError as error:
@@ -42,7 +42,7 @@ def object_named(kind: str, name: str) -> Any:
 
 
 @contextmanager
-def _current_folder() -> Iterator[None]:
+def current_folder() -> Iterator[None]:
     """Modules of the current folder can be imported, after those that are installed."""
     folder = os.getcwd()
     importlib.invalidate_caches()

@@ -36,7 +36,7 @@ from uas_coverage_agents.training.score import (
     point_of,
     score_of,
 )
-from uas_coverage_agents.training.settings import LearnerSettings, class_named
+from uas_coverage_agents.training.settings import LearnerSettings, class_named, hashes_of_own
 from uas_coverage_env.leaderboard import Row
 from uas_coverage_env.leaderboard.flying import fly
 from uas_coverage_env.leaderboard.sweep import source_of
@@ -58,6 +58,7 @@ class TrainingJob:
         seed: Of network, sampling and missions.
         missions: On which the finished policy is scored; the curve is flown on some of them.
         where: Level, family or scenario; that of the settings.
+        modules: Hashes of one's own code, as it is when the job is made.
     """
 
     name: str
@@ -65,14 +66,17 @@ class TrainingJob:
     seed: int = 0
     missions: int = 20
     where: Missions = field(init=False, compare=False)
+    modules: dict[str, str] = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "where", Missions.of(self.settings))
+        object.__setattr__(self, "modules", hashes_of_own(self.settings))
 
     def plain(self) -> dict[str, Any]:
-        """What has to be the same for a training to go on."""
+        """What has to be the same for a training to go on: the code of one's own modules, too."""
         settings = self.settings.model_dump(mode="json")
-        return {"settings": settings, "seed": self.seed, "missions": self.missions}
+        plain = {"settings": settings, "seed": self.seed, "missions": self.missions}
+        return {**plain, "modules": self.modules} if self.modules else plain
 
 
 @dataclass(frozen=True, eq=False)

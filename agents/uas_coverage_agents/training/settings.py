@@ -11,8 +11,9 @@ from pydantic import AfterValidator, BaseModel, Field
 
 from uas_coverage_env.files.strict_toml import InputError, StrictModel, parse, read_toml
 from uas_coverage_env.files.suggestions import did_you_mean
+from uas_coverage_env.leaderboard.hashing import source_hash
 from uas_coverage_env.plugins.installed import entry_points
-from uas_coverage_env.plugins.named_objects import object_named
+from uas_coverage_env.plugins.named_objects import current_folder, object_named
 from uas_coverage_env.plugins.users_code import described
 
 GROUP = "uas_coverage.learners"
@@ -293,6 +294,13 @@ def authors_own(settings: LearnerSettings) -> list[str]:
 
     look([settings.algorithm, settings.policy, settings.learning])
     return [name for name in found if name not in announced]
+
+
+def hashes_of_own(settings: LearnerSettings) -> dict[str, str]:
+    """Module -> SHA-256 of the code that the author of the settings has written."""
+    modules = {name.partition(":")[0].partition(".")[0] for name in authors_own(settings)}
+    with current_folder():
+        return {module: source_hash([module]) for module in sorted(modules - {"__main__"})}
 
 
 def _announced() -> dict[str, EntryPoint]:
