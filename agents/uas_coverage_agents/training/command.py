@@ -267,6 +267,7 @@ def _report(screen: Console, policies: Mapping[Path, "Policy"]) -> None:
             screen.print(table)
         screen.print(
             f"{training.steps} flown steps, {training.process_s:.0f} s of processor time, "
-            f"{training.wall_s:.0f} s by the clock; fly it with --planner policy:{place / 'policy'}",
+            f"{training.wall_s:.0f} s by the clock; "
+            f"fly it with --planner policy:{place / 'policy'}",
             markup=False,
         )
