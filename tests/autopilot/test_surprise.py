@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from uas_coverage_env import load_scenario
+from uas_coverage_env import load_planner, load_scenario, rollout
 from uas_coverage_env.autopilot.lookahead import SURPRISE_S, required_from
 from uas_coverage_env.world.arena import build_arena
 
@@ -27,3 +27,12 @@ def test_a_crazyflie_keeps_as_much_less_as_it_is_quicker():
     scale = float(build_arena(indoor).uas["time_scale"][0])
     assert 0.3 < scale < 0.5
     assert beyond_the_rules_s(indoor) == pytest.approx(scale * SURPRISE_S)
+
+
+@pytest.mark.parametrize(
+    ("mission", "planner"), [("indoor:28", "lawnmower"), ("indoor:51", "nearest-waypoint")]
+)
+def test_nobody_is_behind_a_person_who_turns_round(mission, planner):
+    flight = rollout(load_scenario(mission), load_planner(planner), 0, safety_filter=True)
+    assert flight.figures["violations"] == []
+    assert flight.figures["accomplished"]
