@@ -3,15 +3,17 @@
     python benchmarks/put_table.py sweep         the leaderboard
     python benchmarks/put_table.py sweep test    the same planners on the `test` set
     python benchmarks/put_table.py sweep light   in light wind; likewise moderate, strong,
-                                                 nonlinear (the plant), karhula, searched (an
-                                                 order for milp-mpc), horizon (its N)
+                                                 nonlinear (the plant), karhula, indoor, "air taxi",
+                                                 searched (an order for milp-mpc), horizon (its N)
     python benchmarks/put_table.py sweep village its flights of the village, and "ten seeds":
                                                  median and range of each planner's flights
+    python benchmarks/put_table.py sweep fronts  time and energy of each mission by `weight_energy`,
+                                                 and the picture of the fronts
 
 Fills what stands between the marks `<!-- leaderboard -->` of `baselines/README.md` (`table.md`
 without what its columns mean, and without single scenarios) and of `README.md` (a short table),
 and copies the picture to `docs/pictures`; or a short table between the marks of another name
-(`<!-- test -->`) of `baselines/README.md`; `village` is on `README.md`, `ten seeds` on
+(`<!-- test -->`) of `baselines/README.md`; `village` is on `README.md`, `ten seeds` and `fronts` on
 `docs/trajectory.md`.
 Exits 2 where a file or a mark is missing, or a file was damaged.
 """
@@ -33,24 +35,33 @@ from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.leaderboard.row import Row
 from uas_coverage_env.runner.store import rows_in
 
-UNCERTAIN = ("light", "moderate", "strong", "nonlinear")  # where no flight is as the model has it
-OF_FLIGHTS = {"village": ROOT / "README.md", "ten seeds": ROOT / "docs" / "trajectory.md"}
-MARKS = ("leaderboard", "test", "karhula", "searched", "horizon", *UNCERTAIN, *OF_FLIGHTS)
+HARD = ("light", "moderate", "strong", "nonlinear", "indoor", "air taxi")  # not all is covered
+OF_FLIGHTS = {
+    "village": ROOT / "README.md",
+    "ten seeds": ROOT / "docs" / "trajectory.md",
+    "fronts": ROOT / "docs" / "trajectory.md",
+}
+MARKS = ("leaderboard", "test", "karhula", "searched", "horizon", *HARD, *OF_FLIGHTS)
+WEIGHTS = {
+    "0.4": "all that help (`weight_energy` 0.4)",
+    "0.6": "0.6, the default",
+    "20": "one UAS (20)",
+}
 COLUMNS_EXPLAINED = "Interquartile means"
-PICTURE = ROOT / "docs" / "pictures" / "leaderboard.png"
+PICTURES = {name: ROOT / "docs" / "pictures" / f"{name}.png" for name in ("leaderboard", "front")}
 
 
 def short_table(data: dict[str, Any], mark: str = "leaderboard") -> str:
     """A row for each planner: missions accomplished, energy and steps beside the reference.
 
-    Where no flight is as the model has it, coverage takes the place of decision times and bound.
+    Where missions may not be accomplished, coverage takes the place of decision times and bound.
     """
     reference = data["reference"]
-    columns = dict(_UNCERTAIN if mark in UNCERTAIN else _STILL)
+    columns = dict(_HARD if mark in HARD else _STILL)
     columns[f"Δ energy to {reference}, %"] = lambda one: _difference(one, reference, "energy")
     columns["Δ steps, %"] = lambda one: _difference(one, reference, "steps")
     bounded = any(one["above_bound_percent"]["value"] is not None for one in data["scores"])
-    if bounded and mark not in UNCERTAIN:
+    if bounded and mark not in HARD:
         columns["above the bound, %"] = lambda one: _plain(_estimate(one["above_bound_percent"]))
     lines = [
         "| " + " | ".join(["planner", *columns]) + " |",
@@ -82,6 +93,25 @@ def spread_table(rows: Sequence[Row], command: str) -> str:
     return "\n".join([f"`{command}`", "", *lines])
 
 
+def fronts_table(rows: Sequence[Row], command: str) -> str:
+    """Steps and energy of each mission by the weight of energy that its flight was planned with."""
+    headings = WEIGHTS.values()
+    lines = [f"| mission | {' | '.join(headings)} |", "| --- |" + " ---: |" * len(headings)]
+    flown: dict[str, dict[str, Row]] = {}
+    for one in rows:
+        weight = one.label.partition("+weight_energy-")[2].partition("+")[0]
+        flown.setdefault(one.scenario, {})[weight] = one
+    for scenario, by_weight in sorted(flown.items()):
+        cells = [
+            f"{by_weight[weight].steps} steps, {by_weight[weight].energy_Wh:.2f} Wh"
+            if weight in by_weight and by_weight[weight].accomplished
+            else "–"
+            for weight in WEIGHTS
+        ]
+        lines.append(f"| {scenario} | {' | '.join(cells)} |")
+    return "\n".join([f"`{command}`", "", *lines])
+
+
 def _spread(values: Sequence[float], digits: str) -> str:
     if len(values) == 1:
         return f"{values[0]:{digits}}"
@@ -99,7 +129,7 @@ _STILL: _Columns = {
     ),
 }
 
-_UNCERTAIN: _Columns = {
+_HARD: _Columns = {
     "accomplished": _STILL["accomplished"],
     "all home": lambda one: f"{one['all_home']}/{one['flights']}",
     "violations": _STILL["violations"],
@@ -147,7 +177,9 @@ def main(folder: str, mark: str = "leaderboard") -> int:
         for path, text in texts.items():
             path.write_text(text, encoding="utf-8", newline="")
         if mark == "leaderboard":
-            shutil.copyfile(sweep / "coverage-energy.png", PICTURE)
+            shutil.copyfile(sweep / "coverage-energy.png", PICTURES["leaderboard"])
+        elif mark == "fronts":
+            shutil.copyfile(sweep / "front.png", PICTURES["front"])
     except (OSError, ValueError, InputError) as error:
         sys.stderr.write(f"error: {error}\n")
         return 2
@@ -161,6 +193,8 @@ def _long(table: str) -> str:
 
 def _of_flights(sweep: Path, mark: str) -> str:
     data = json.loads((sweep / "table.json").read_text(encoding="utf-8"))
+    if mark == "fronts":
+        return fronts_table(rows_in(sweep, Row), data["command"])
     rows = [one for one in rows_in(sweep, Row) if one.scenario == "village"]
     if not rows:
         raise ValueError(f"{sweep}: has no flight of the village")

@@ -1,4 +1,4 @@
-"""Draw the picture of the families of scenarios: python docs/families_picture.py.
+"""Draw the picture of the families of scenarios: python docs/gallery.py families.png.
 
 `families_table` is the table under it.
 """
@@ -41,7 +41,3 @@ def main() -> None:
     rows = [np.hstack(tiles[k : k + COLUMNS]) for k in range(0, len(tiles), COLUMNS)]
     image = Image.fromarray(np.vstack(rows)).quantize(128)
     image.save(PICTURE, optimize=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,13 +1,22 @@
-"""Make the pictures of scenarios, planners and replay pages: python docs/gallery.py.
+"""Make the pictures of scenarios, planners and replay pages.
 
-Flies the planners that take less than a minute, and opens replay pages in headless Chromium. Needs
-Chromium, its driver (Debian: `chromium`, `chromium-driver`) and the extra `test`.
+    python docs/gallery.py                    all of them
+    python docs/gallery.py maps               those that are drawn
+    python docs/gallery.py pages              replay pages
+    python docs/gallery.py replay-indoor.png  some, by name
+
+Flies planners that take less than a minute, and opens replay pages in headless Chromium. Needs the
+extra `test`, and for pages Chromium and its driver (Debian: `chromium`, `chromium-driver`).
 """
 
+import contextlib
 import io
+import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
+import families_picture
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
@@ -16,6 +25,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
 from uas_coverage_env import Flight, Scenario, generate_scenario, load_planner, rollout
+from uas_coverage_env.cli import main
 from uas_coverage_env.draw import picture
 from uas_coverage_env.flight import flight_picture
 from uas_coverage_env.flight.figures import summary
@@ -89,16 +99,77 @@ def save_page(flight: Flight, moment: str, name: str, theme: str) -> None:
     save(shot.resize(PAGE_PX, Image.Resampling.LANCZOS), name)
 
 
-def main() -> None:
-    """Make them all."""
+def scenarios() -> None:
+    """Draw shipped missions at their start."""
     save_tiles([scenario_picture(load_scenario(name), name) for name in SCENARIOS], "scenarios.png")
-    flights = {name: rollout("village", load_planner(name)) for name in PLANNERS}
-    save_tiles([flown_picture(flight) for flight in flights.values()], "planners.png")
-    save_page(flights["tour"], "t=80", "replay.png", "light")
+
+
+def planners() -> None:
+    """Draw the village as planners fly it."""
+    flights = [rollout("village", load_planner(name)) for name in PLANNERS]
+    save_tiles([flown_picture(flight) for flight in flights], "planners.png")
+
+
+def drawn_by(name: str, *commands: str) -> None:
+    """Keep the last file that some command lines write: those that the page has."""
+    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+        for command in commands:
+            if main(command.split()):
+                raise SystemExit(f"uas-coverage {command}: failed")
+        save(Image.open(commands[-1].split()[-1]), name)
+
+
+def page(scenario: str, planner: str, moment: str, name: str, dynamics: str = "lpv") -> None:
+    """Keep a replay page of a whole flight."""
+    flight = rollout(scenario, load_planner(planner), dynamics=dynamics)
+    save_page(flight, moment, name, "light")
+
+
+def swarm() -> None:
+    """Keep a replay page of a large fleet."""
     town = generate_scenario(seed=5, n_uas=32, n_waypoints=320, n_obstacles=8)
-    swarm = rollout(town, load_planner("nearest-waypoint"), max_steps=120)
-    save_page(swarm, "t=90&trail=power", "replay-swarm.png", "dark")
+    flight = rollout(town, load_planner("nearest-waypoint"), max_steps=120)
+    save_page(flight, "t=90&trail=power", "replay-swarm.png", "dark")
+
+
+DRAWN: dict[str, Callable[[], None]] = {
+    "scenarios.png": scenarios,
+    "planners.png": planners,
+    "families.png": families_picture.main,
+    "zones.png": lambda: drawn_by(
+        "zones.png",
+        "import zones --height 60 --flown-by autopilot --out zones.toml",
+        "run zones.toml --planner trajectory --out zones_flight",
+        "figure zones_flight --kind map --out zones_map.png",
+    ),
+    "seen_ground.png": lambda: drawn_by(
+        "seen_ground.png",
+        "run mixed_fleet --planner lawnmower --out roles",
+        "figure roles --kind map --out seen_ground.png",
+    ),
+}
+PAGES: dict[str, Callable[[], None]] = {
+    "replay.png": lambda: page("village", "tour", "t=80", "replay.png"),
+    "replay-swarm.png": swarm,
+    "replay-indoor.png": lambda: page("indoor", "trajectory", "t=20", "replay-indoor.png"),
+    "replay-air-taxi.png": lambda: page(
+        "air_taxi", "trajectory", "t=150", "replay-air-taxi.png", "nonlinear"
+    ),
+}
+
+
+def draw(names: list[str]) -> int:
+    """Make some pictures: `maps`, `pages`, or by name."""
+    makers = {**DRAWN, **PAGES}
+    sets = {"maps": list(DRAWN), "pages": list(PAGES)}
+    wanted = [one for name in names or sets for one in sets.get(name, [name])]
+    if unknown := set(wanted) - set(makers):
+        sys.stderr.write(f"error: no picture {sorted(unknown)[0]}; one of {', '.join(makers)}\n")
+        return 2
+    for name in wanted:
+        makers[name]()
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(draw(sys.argv[1:]))

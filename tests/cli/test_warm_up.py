@@ -96,7 +96,7 @@ def test_a_run_says_once_for_what_it_compiles_and_a_quiet_one_nothing(
     words, lines, elsewhere, monkeypatch, capfd
 ):
     monkeypatch.setattr(progress, "PATIENCE_S", 0.0)
-    monkeypatch.setattr(COMPILATIONS, "listener", progress._say_it_once())
+    monkeypatch.setattr(COMPILATIONS, "told", set())
     monkeypatch.setattr(cli_run, "load_planner", lambda name, options: Compiles())
     assert main(["run", "open_field", "--planner", "hover", "--steps", "2", *words]) == 0
     err = capfd.readouterr().err

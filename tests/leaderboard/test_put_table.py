@@ -26,7 +26,7 @@ def put_table(tmp_path, monkeypatch):
         blocks = ["{}old\n{}\n".format(*marks_of(mark)) for mark in module.MARKS]
         (tmp_path / name).write_text(f"before\n{''.join(blocks)}after\n")
     monkeypatch.setattr(module, "ROOT", tmp_path)
-    monkeypatch.setattr(module, "PICTURE", tmp_path / "picture.png")
+    monkeypatch.setitem(module.PICTURES, "leaderboard", tmp_path / "picture.png")
     return module
 
 
@@ -119,3 +119,20 @@ def test_flights_of_a_planner_are_a_median_and_a_range_and_one_flight_is_itself(
         "| `near` | 3 of 3 | 8 (7 to 20) | 2.00 (1.00 to 3.00) |",
         "| `far` | 0 of 1 | 9 | 4.00 |",
     ]
+
+
+def test_fronts_are_a_row_for_each_mission_and_what_was_not_accomplished_has_no_figures(put_table):
+    flights = [("b", "0.4", 9, 4.0, True), ("b", "20", 30, 3.0, False), ("a", "0.6", 7, 2.5, True)]
+    rows = [
+        SimpleNamespace(
+            label=f"trajectory+weight_energy-{weight}+planned_orders-3",
+            scenario=scenario,
+            steps=steps,
+            energy_Wh=energy_Wh,
+            accomplished=accomplished,
+        )
+        for scenario, weight, steps, energy_Wh, accomplished in flights
+    ]
+    lines = put_table.fronts_table(rows, "compare").splitlines()
+    assert lines[0] == "`compare`"
+    assert lines[-2:] == ["| a | – | 7 steps, 2.50 Wh | – |", "| b | 9 steps, 4.00 Wh | – | – |"]

@@ -260,6 +260,19 @@ def test_against_a_wind_less_is_left_and_no_less_than_a_flight_against_it_takes(
     assert exported(there, ANYWHERE, "csv").data["uas"] == [windy]
 
 
+def test_the_command_shows_what_is_left_in_wind_in_a_column_of_its_own(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setenv("COLUMNS", "120")
+    north_and_back().save(tmp_path / "flight")
+    words = ("export", str(tmp_path / "flight"), "--format", "csv", "--place", "1,2")
+    for name, more in (("still", ()), ("windy", ("--wind", "6"))):
+        assert main([*words, *more, "--out", str(tmp_path / name)]) == 0
+        head, row = capsys.readouterr().out.splitlines()[:2]
+        assert ("spare in wind" in head) == bool(more)
+        assert row.count("%") == 2 + len(more) // 2
+
+
 def test_who_makes_no_headway_against_the_wind_has_no_return():
     made = exported(north_and_back(), ANYWHERE, "csv", wind_mps=30.0)
     assert made.data["uas"][0]["point_of_no_return"] is None

@@ -248,11 +248,10 @@ def _report_export(screen: Console, made: "Export", out: Path) -> None:
     table = Table(
         "UAS", "starts, s", "legs", "flight, s", "planned, s", "charge landed", "spare", box=None
     )
-    if any(uas["in_wind"] for uas in made.data["uas"]):
-        table.add_column("in wind")
+    windy = any(uas["in_wind"] for uas in made.data["uas"])
+    if windy:
+        table.add_column("spare in wind")
     for uas in made.data["uas"]:
-        windy = uas["in_wind"]
-        spare = f"{uas['least_spare']['spare']:.1%}"
         table.add_row(
             uas["name"],
             f"{uas['begins_s']:.0f}",
@@ -260,7 +259,8 @@ def _report_export(screen: Console, made: "Export", out: Path) -> None:
             f"{uas['duration_s']:.0f}",
             f"{uas['planned_s']:.0f}",
             f"{uas['soc_landed']:.1%}",
-            f"{spare} ({windy['least_spare']['spare']:.1%} in wind)" if windy else spare,
+            f"{uas['least_spare']['spare']:.1%}",
+            *([f"{uas['in_wind']['least_spare']['spare']:.1%}"] if windy else []),
         )
     screen.print(table)
     for name in made.grounded:

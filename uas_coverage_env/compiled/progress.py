@@ -30,21 +30,15 @@ Listener = Callable[[float | None], object]
 _logger = logging.getLogger("uas_coverage_env")
 
 
-def _say_it_once() -> Listener:
-    """Says it once for each purpose."""
-    said: set[str] = set()
-
-    def listener(share: float | None) -> None:
-        if purpose() in said or _logger.level > logging.INFO:
-            return
-        said.add(purpose())
-        notice = NOTICE.format(purpose=purpose())
-        if _logger.isEnabledFor(logging.INFO) and _logger.hasHandlers():
-            _logger.info(notice)
-        else:
-            print(f"uas_coverage_env: {notice}", file=sys.stderr, flush=True)
-
-    return listener
+def _say_once(share: float | None) -> None:
+    """Says it once for each purpose, and not where a bar has shown it before."""
+    if purpose() in COMPILATIONS.told or _logger.level > logging.INFO:
+        return
+    notice = NOTICE.format(purpose=purpose())
+    if _logger.isEnabledFor(logging.INFO) and _logger.hasHandlers():
+        _logger.info(notice)
+    else:
+        print(f"uas_coverage_env: {notice}", file=sys.stderr, flush=True)
 
 
 class Compilations(event.Listener):
@@ -54,17 +48,20 @@ class Compilations(event.Listener):
 
     Attributes:
         listener: Told once the process has spent more than PATIENCE_S.
+        told: The purposes that a listener was told of.
         n_compiled: Kernels compiled so far, each of its parts counted.
+        n_made: Those of them that are ready, since the listener began to listen.
         spent_s: Time spent on that [s].
         processor_s: Processor time spent on that [s].
     """
 
     def __init__(self) -> None:
-        self.listener = _say_it_once()
+        self.listener: Listener = _say_once
+        self.told: set[str] = set()
         self.n_compiled = 0
         self.spent_s = self._since_s = 0.0
         self.processor_s = self._busy_since_s = 0.0
-        self._depth = self._n_made = 0
+        self._depth = self.n_made = 0
 
     def on_start(self, event: Any) -> None:
         """A kernel that is not on the disk is compiled."""
@@ -72,7 +69,7 @@ class Compilations(event.Listener):
             self.n_compiled += 1
             self._depth += 1
             if self._depth == 1:
-                self._since_s, self._n_made = time.perf_counter(), 0
+                self._since_s = time.perf_counter()
                 self._busy_since_s = time.process_time()
             self._tell()
 
@@ -80,7 +77,7 @@ class Compilations(event.Listener):
         """It is there, or cannot be compiled."""
         if isinstance(event.data["dispatcher"], KernelDispatcher | MachineCode):
             self._depth -= 1
-            self._n_made += 1
+            self.n_made += 1
             self._tell()
             if self._depth == 0:
                 self.spent_s += time.perf_counter() - self._since_s
@@ -88,7 +85,8 @@ class Compilations(event.Listener):
 
     def _tell(self) -> None:
         if self.spent_s + time.perf_counter() - self._since_s > PATIENCE_S:
-            self.listener(1.0 - _LEFT_BY_A_KERNEL**self._n_made if self._depth else None)
+            self.listener(1.0 - _LEFT_BY_A_KERNEL**self.n_made if self._depth else None)
+            self.told.add(purpose())
 
 
 COMPILATIONS = Compilations()
@@ -98,7 +96,7 @@ event.register("numba:compile", COMPILATIONS)
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
     """Have compilations told to another listener for a while."""
-    before, COMPILATIONS.listener = COMPILATIONS.listener, listener
+    before, COMPILATIONS.listener, COMPILATIONS.n_made = COMPILATIONS.listener, listener, 0
     try:
         yield
     finally:

@@ -76,8 +76,9 @@ class Comparison:
         some = "" if len(self.rows) == self.planned else f" of {self.planned} (not finished)"
         lines = [
             f"{self.command}",
-            f"{len(self.rows)} flights{some}: {len(self.scores)} planners, {scenarios} scenarios, "
-            f"{seeds} {'seed' if seeds == 1 else 'seeds'}",
+            f"{_counted(len(self.rows), 'flight')}{some}: "
+            f"{_counted(len(self.scores), 'planner')}, {_counted(scenarios, 'scenario')}, "
+            f"{_counted(seeds, 'seed')}",
             f"{machine()}; {self.jobs}",
             versions(),
         ]
@@ -210,3 +211,7 @@ def failures(rows: Sequence[Row]) -> list[str]:
         f"(first: {those[0].scenario}, seed {those[0].seed}): {why}"
         for (label, what, why), those in found.items()
     ]
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

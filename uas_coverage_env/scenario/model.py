@@ -28,8 +28,8 @@ class Scenario(UncheckedScenario):
         min_height_m: Least height of a UAS above the ground (z = 0) and above roofs, except for
             take-off and landing; without it, or at 0, there is no such rule [m].
         route_margin_m: What routes keep beyond the distances that count as a breach; without it,
-            it follows from the vehicles: 1 m where they stop in 25 to 30 m, as the shipped
-            multirotors do, and in proportion where they stop in less or more [m].
+            it follows from the vehicles: 1 m where they stop in 25 to 30 m, as the S500
+            and the hexacopter do, and in proportion where they stop in less or more [m].
         from_ground: Whether UAS climb from the ground to their starts before t = 0, and descend to
             it after the last sample; without it missions begin and end in the air.
         relaunch: Whether landed UAS take off again on their remaining charge, when no other UAS is

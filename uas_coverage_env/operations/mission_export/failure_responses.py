@@ -100,8 +100,8 @@ def not_safe(one: MissionFile) -> Iterator[str]:
     if not levels.suffices:
         yield (
             f"has no safe way home for low charge: it may take {levels.low_soc:.0%}, and a flight "
-            f"as planned has {max(last.soc, 0.0):.0%} left before it lands, so that the failsafe "
-            f"ends it; plan for less, or with a larger pack{_or_a_higher_ceiling(one)}"
+            f"as planned has {max(last.soc, 0.0):.0%} left before it lands: the failsafe would "
+            f"break it off; plan for less, or with a larger pack{_or_a_higher_ceiling(one)}"
         )
     if one.home.braking:
         yield (
