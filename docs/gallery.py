@@ -119,12 +119,6 @@ def drawn_by(name: str, *commands: str) -> None:
         save(Image.open(commands[-1].split()[-1]), name)
 
 
-def page(scenario: str, planner: str, moment: str, name: str, dynamics: str = "lpv") -> None:
-    """Keep a replay page of a whole flight."""
-    flight = rollout(scenario, load_planner(planner), dynamics=dynamics)
-    save_page(flight, moment, name, "light")
-
-
 def swarm() -> None:
     """Keep a replay page of a large fleet."""
     town = generate_scenario(seed=5, n_uas=32, n_waypoints=320, n_obstacles=8)
@@ -149,11 +143,16 @@ DRAWN: dict[str, Callable[[], None]] = {
     ),
 }
 PAGES: dict[str, Callable[[], None]] = {
-    "replay.png": lambda: page("village", "tour", "t=80", "replay.png"),
+    "replay.png": lambda: save_page(rollout("village", "tour"), "t=80", "replay.png", "light"),
     "replay-swarm.png": swarm,
-    "replay-indoor.png": lambda: page("indoor", "trajectory", "t=20", "replay-indoor.png"),
-    "replay-air-taxi.png": lambda: page(
-        "air_taxi", "trajectory", "t=150", "replay-air-taxi.png", "nonlinear"
+    "replay-indoor.png": lambda: save_page(
+        rollout("indoor", "trajectory"), "t=20", "replay-indoor.png", "light"
+    ),
+    "replay-air-taxi.png": lambda: save_page(
+        rollout("air_taxi", "trajectory", dynamics="nonlinear"),
+        "t=150",
+        "replay-air-taxi.png",
+        "light",
     ),
 }
 
