@@ -62,7 +62,8 @@ class PackedPpo:
         self._settings, self._missions, self._seed = settings, missions, seed
         self._own = own_settings(settings, PackedSettings, _READ)
         self._keywords, self._flown = missions.settings(), 0
-        if (begun := self._own.beginnings * self._own.beginning_rounds) > settings.rounds:
+        begins = self._own.beginnings
+        if begins > 1 and (begun := begins * self._own.beginning_rounds) > settings.rounds:
             raise InputError(f"[learning] beginnings take {begun} of {settings.rounds} rounds")
         for phase in self._own.phases:
             self._check(phase)

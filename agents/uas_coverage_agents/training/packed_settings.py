@@ -80,7 +80,7 @@ class PackedSettings(StrictModel):
         missions: Of a round, from which the environments draw.
         beginnings: So many trainings begin, one after the other; the one that comes to most on
             validation missions goes on in the rounds after these.
-        beginning_rounds: Of each.
+        beginning_rounds: Of each, where there are several.
         validate_every: Steps after which what was learned flies validation missions; the best so
             far is the policy. 0: never, and the last is.
         validation_missions: How many.
