@@ -128,10 +128,10 @@ class PackedPpo:
             self._steps += len(rows.read)
             self._flown += len(rows.read)
             kl = self._learn_from(rows, phase, noise)
-            told.add(self._flown, kl=kl, noise=noise, **flown.tell())
-            later = self._steps % every < len(rows.read) if every else False
-            if later or (every and self._flown >= wanted):
-                told.add(self._flown, worth=self._validated())
+            numbers = {"kl": kl, "noise": noise, **flown.tell()}
+            if every and (self._steps % every < len(rows.read) or self._flown >= wanted):
+                numbers["worth"] = self._validated()
+            told.add(self._flown, **numbers)
 
     def state_dict(self) -> Arrays:
         """Weights, the moments of Adam, and the steps; the best so far where one is chosen."""
