@@ -22,7 +22,7 @@ TINY = (
     *("num_envs=2", "rounds=2", "total_timesteps=64", "size.n_uas=[2,2]"),
     *("size.n_waypoints=[5,5]", "size.n_obstacles=[0,2]"),
     *("learning.n_steps=8", "learning.batch_size=16", "learning.hidden=[8,4]"),
-    *("learning.missions=2", "learning.beginnings=1", "learning.validation_missions=2"),
+    *("learning.missions=2",),
 )
 LEARNERS = "ppo-waypoint", "ppo-velocity"
 

@@ -23,7 +23,6 @@ SETTINGS = (
     *("environment.return_mode=false", "environment.safety_filter=false"),
     *("environment.max_cycles=4", "learning.n_steps=6", "learning.batch_size=16"),
     *("learning.hidden=[8,4]", "learning.missions=3"),
-    *("learning.beginnings=1", "learning.validation_missions=1"),
 )
 
 

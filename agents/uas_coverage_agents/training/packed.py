@@ -8,19 +8,18 @@ Schulman et al. 2017 as it is usually done, on the batch of environments itself.
   `Phase`. A loss that costs much from the first step on teaches to land at once.
 - *Noise by a schedule* where actions are numbers: no landing is found with more than a tenth of the
   top speed, and a spread that is learned stays above it.
-- *Beginnings.* Where trainings differ more than settings do, several begin, and the better one on
-  validation missions goes on; what flies is the best on these.
 - *The time limit is an end*, since the time that is left is observed.
 """
 
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 from torch import Tensor, nn
 
 from uas_coverage_agents.policy.actor import Actor
@@ -30,19 +29,114 @@ from uas_coverage_agents.training.draws import drawn, likely
 from uas_coverage_agents.training.flown import CUDA, FlownMissions, device_of
 from uas_coverage_agents.training.learner import SEEDS_APART, Arrays, Learned, Told
 from uas_coverage_agents.training.missions import Missions
-from uas_coverage_agents.training.packed_settings import PackedSettings, Phase
-from uas_coverage_agents.training.settings import LearnerSettings, own_settings
+from uas_coverage_agents.training.settings import Count, LearnerSettings, own_settings
 from uas_coverage_agents.training.torch_state import Modules
-from uas_coverage_agents.training.worth import worth_of
 from uas_coverage_env.entities.state import FLYING, LANDED
 from uas_coverage_env.env import K_WAYPOINTS, CoverageBatch, MissionSettings
-from uas_coverage_env.files.strict_toml import InputError
+from uas_coverage_env.files.strict_toml import InputError, StrictModel
+from uas_coverage_env.scenario import Scenario
+from uas_coverage_env.tasks.lessons import LESSONS
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
 
 _READ = {"num_envs", "total_timesteps", "environment", "device"}
 AUTORESET = "same_step"
 """Of missions on the processor."""
 
 _MOMENTS = ("exp_avg", "exp_avg_sq", "step")
+
+
+class Phase(StrictModel):
+    """What holds from some step on; a round has the phase in which it begins.
+
+    Attributes:
+        begins: At which share of all steps.
+        reward_weights: Instead of those of the environment.
+        learning_rate: Of Adam.
+        ent_coef: Weight of the entropy of the choices.
+        noise: Standard deviation of actions that are numbers, at its begin and its end; between
+            them it falls exponentially.
+        lessons: Lessons of levels (`uas_coverage_env.tasks.LESSONS`), and which share of the
+            missions is easier by each; the rest are as they are.
+    """
+
+    begins: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    reward_weights: dict[str, float] = Field(default_factory=dict)
+    learning_rate: Positive = 7e-4
+    ent_coef: NotNegative = 0.0
+    noise: tuple[Positive, Positive] = (0.4, 0.4)
+    lessons: dict[str, Share] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _are_lessons(self) -> Self:
+        for name in self.lessons:
+            if name not in LESSONS or LESSONS[name].of is None:
+                known = ", ".join(each for each, lesson in LESSONS.items() if lesson.of)
+                raise ValueError(f"lessons: {name!r} is none that changes missions: {known}")
+        if sum(self.lessons.values()) > 1.0:
+            raise ValueError(f"lessons: shares of {sum(self.lessons.values()):g}; give at most 1")
+        return self
+
+    def taught(self, missions: Sequence[Scenario]) -> list[Scenario]:
+        """The missions, of which shares are those of the lessons."""
+        taught, first = list(missions), 0
+        for name, share in self.lessons.items():
+            last = first + round(share * len(taught))
+            easier = LESSONS[name].of
+            assert easier is not None
+            taught[first:last] = map(easier, taught[first:last])
+            first = last
+        return taught
+
+
+class PackedSettings(StrictModel):
+    """The table `[learning]`; names are those of Stable-Baselines3 where it has one.
+
+    Attributes:
+        n_steps: Of each environment, before the weights are changed.
+        batch_size: Decisions that are learned from at once.
+        n_epochs: How often each is learned from.
+        gamma: Discount of a step.
+        gae_lambda: Of generalised advantage estimation.
+        clip_range: Of the ratio of probabilities.
+        vf_coef: Weight of the error of values.
+        max_grad_norm: Gradients are shortened to it.
+        target_kl: No further epoch where the policy has moved so far.
+        reward_scale: What is learned is this times the reward.
+        hidden: Widths of the layers, of policy and of values.
+        width: Of the scorer of candidates; 0: there is none, choices are outputs like others.
+        rows: How many of the nearest waypoints the layers see.
+        temperature: At which the policy draws its choices in flight: 1 as while it learns, 0 the
+            best one.
+        missions: Of a round, from which the environments draw.
+        phases: In order of their begin; the first begins at 0.
+    """
+
+    n_steps: Count = 64
+    batch_size: Count = 4096
+    n_epochs: Count = 2
+    gamma: Share = 0.998
+    gae_lambda: Share = 0.97
+    clip_range: Positive = 0.2
+    vf_coef: NotNegative = 0.5
+    max_grad_norm: Positive = 0.5
+    target_kl: Positive = 0.04
+    reward_scale: Positive = 0.2
+    hidden: Annotated[tuple[Count, ...], Field(min_length=1, max_length=8)] = (96, 64)
+    width: Annotated[int, Field(ge=0, le=4096)] = 32
+    rows: Count = 6
+    temperature: NotNegative = 0.5
+    missions: Count = 128
+    phases: Annotated[tuple[Phase, ...], Field(min_length=1)] = (Phase(),)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        begins = [phase.begins for phase in self.phases]
+        if begins[0] != 0 or sorted(set(begins)) != begins:
+            raise ValueError(f"phases: they begin at {begins}; give 0 first, then rising numbers")
+        return self
 
 
 class PackedPpo:
@@ -61,10 +155,7 @@ class PackedPpo:
         torch.manual_seed(seed)
         self._settings, self._missions, self._seed = settings, missions, seed
         self._own = own_settings(settings, PackedSettings, _READ)
-        self._keywords, self._flown = missions.settings(), 0
-        begins = self._own.beginnings
-        if begins > 1 and (begun := begins * self._own.beginning_rounds) > settings.rounds:
-            raise InputError(f"[learning] beginnings take {begun} of {settings.rounds} rounds")
+        self._keywords, self._steps = missions.settings(), 0
         for phase in self._own.phases:
             self._check(phase)
         rules = MissionSettings.of(self._keywords)
@@ -81,44 +172,25 @@ class PackedPpo:
             environment=plain(self._keywords),
             slope=next(iter(rules.kind.parameters), 1.0) if points else None,
         )
-        self._rival: Arrays = {}
-        self._begin()
-
-    def _begin(self) -> None:
-        """With weights that have learned nothing."""
         self._model = ActorCritic(self._network).to(self._device)
         self._optimiser = torch.optim.Adam(self._model.parameters(), eps=1e-5)
-        self._modules, self._steps = Modules(model=self._model), 0
-        self._best: Arrays = {}
-        self._worth = -np.inf
+        self._modules = Modules(model=self._model)
 
     @property
     def steps(self) -> int:
-        """Decisions that were learned from, those of all beginnings together."""
-        return self._flown
+        """Decisions that were learned from."""
+        return self._steps
 
     def learn(self, number: int, told: Told) -> None:
         """As many steps as are a round's share of the whole, in new missions."""
-        beginning, since = divmod(number, self._own.beginning_rounds)
-        begins = beginning < self._own.beginnings
-        if begins and beginning and since == 0:
-            self._rival = {f"rival/{name}": each for name, each in self.state_dict().items()}
-            self._begin()
-        self._go_on(number, told)
-        if begins and self._rival and since == self._own.beginning_rounds - 1:
-            rival, self._rival = _within(self._rival, "rival/"), {}
-            if rival["worth"] >= self._worth:
-                self.load_state_dict({**rival, "flown": np.array(self._flown)})
-
-    def _go_on(self, number: int, told: Told) -> None:
-        settings, every = self._settings, self._own.validate_every
+        settings = self._settings
         wanted = settings.total_timesteps * (number + 1) // settings.rounds
-        if self._flown >= wanted:
+        if self._steps >= wanted:
             return
         begins = [phase.begins for phase in self._own.phases]
         phase = self._own.phases[bisect_right(begins, self._share) - 1]
         flown = _Flown(self._begun(phase, number), self._own)
-        while self._flown < wanted:
+        while self._steps < wanted:
             noise = self._noise(phase)
             rows = flown.collect(self._model, noise)
             if self._steps == 0:
@@ -126,19 +198,12 @@ class PackedPpo:
                 with torch.no_grad():
                     self._model.standardise(rows.read, rows.each, rows.exists)
             self._steps += len(rows.read)
-            self._flown += len(rows.read)
             kl = self._learn_from(rows, phase, noise)
-            numbers = {"kl": kl, "noise": noise, **flown.tell()}
-            if every and (self._steps % every < len(rows.read) or self._flown >= wanted):
-                numbers["worth"] = self._validated()
-            told.add(self._flown, **numbers)
+            told.add(self._steps, kl=kl, noise=noise, **flown.tell())
 
     def state_dict(self) -> Arrays:
-        """Weights, the moments of Adam, and the steps; the best so far where one is chosen."""
+        """Weights, the moments of Adam, and the steps."""
         arrays = {**self._modules.state_dict(), "steps": np.array(self._steps)}
-        if self._own.validate_every:
-            arrays |= {"flown": np.array(self._flown), "worth": np.array(self._worth)}
-            arrays |= {f"best/{name}": array for name, array in self._best.items()} | self._rival
         for k, kept in self._optimiser.state_dict()["state"].items():
             arrays |= {f"adam/{k}/{name}": kept[name].cpu().numpy().copy() for name in _MOMENTS}
         return arrays
@@ -149,14 +214,7 @@ class PackedPpo:
         kept = self._optimiser.state_dict()
         shapes = [parameter.shape for parameter in self._model.parameters()]
         try:
-            self._steps = self._flown = int(state["steps"])
-            if self._own.validate_every:
-                self._flown, self._worth = int(state["flown"]), float(state["worth"])
-                self._best = _within(state, "best/")
-                of_best = {name: array.shape for name, array in self._best.items()}
-                if of_best not in ({}, self._network.shapes()):
-                    raise ValueError("best: other shapes")
-                self._rival = {name: state[name] for name in state if name.startswith("rival/")}
+            self._steps = int(state["steps"])
             if self._steps:
                 for k, shape in enumerate(shapes):
                     moments = {n: torch.from_numpy(state[f"adam/{k}/{n}"].copy()) for n in _MOMENTS}
@@ -168,19 +226,10 @@ class PackedPpo:
             raise InputError(f"the checkpoint does not fit this learner ({error})") from error
 
     def learned(self) -> Learned:
-        """The policy, the best so far where one is chosen; it flies without torch."""
-        return self._learned(self._best or self._model.tensors())
-
-    def _learned(self, tensors: Arrays) -> Learned:
-        return Learned("environment", self._network, observed(self._keywords), tensors)
-
-    def _validated(self) -> float:
-        """What is known now, on validation missions; kept where nothing was better."""
-        tensors = {name: array.copy() for name, array in self._model.tensors().items()}
-        worth = worth_of(self._learned(tensors), self._missions, self._own.validation_missions)
-        if worth > self._worth:
-            self._worth, self._best = worth, tensors
-        return worth
+        """The policy; it flies without torch."""
+        return Learned(
+            "environment", self._network, observed(self._keywords), self._model.tensors()
+        )
 
     def _check(self, phase: Phase) -> None:
         try:
@@ -225,10 +274,7 @@ class PackedPpo:
 
     @property
     def _share(self) -> float:
-        """Of the steps of one training, the other beginnings left out."""
-        rounds, own = self._settings.rounds, self._own
-        alone = rounds - (own.beginnings - 1) * own.beginning_rounds
-        return self._steps * rounds / (self._settings.total_timesteps * alone)
+        return self._steps / self._settings.total_timesteps
 
     def _noise(self, phase: Phase) -> float:
         """Of actions that are numbers, now."""
@@ -384,10 +430,3 @@ def advantages_of(
 def _joined(parts: Sequence[Any]) -> Any:
     """Of all steps, one after the other; None where there are none."""
     return None if parts[0] is None else torch.cat(tuple(parts))
-
-
-def _within(state: Mapping[str, NDArray[Any]], owner: str) -> Arrays:
-    """What is kept for one, by names of its own."""
-    return {
-        name.removeprefix(owner): each for name, each in state.items() if name.startswith(owner)
-    }
