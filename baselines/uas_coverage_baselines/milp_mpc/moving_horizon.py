@@ -10,7 +10,6 @@ from typing import Generic, Self, TypeVar
 
 import numpy as np
 
-from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
 from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
@@ -112,7 +111,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
             self._steering = along_order(brief, seed)
         self.last_plan = self.plan = self._backup = None
         self._round_robin = RoundRobin()
-        margins = margins_in(brief, self.options.margin_m, self.options.moving_margin_m)
+        margins = self.options.margins(brief)
         self._near_home_m = length_scale(brief.vehicles, brief.dt_s) * _CAREFUL_WITHIN_M
         self._follower = RouteFollower(brief, margins.fixed_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
@@ -206,7 +205,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def _effort(self) -> Effort:
         return Effort(
-            work=self.options.effort,
+            work=self.options.effort * min(self.dt_s, 1.0),  # shorter steps are due sooner
             threads=self.options.threads,
             teams=self.options.teams,
             at_once=self.options.at_once,
