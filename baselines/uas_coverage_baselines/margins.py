@@ -33,7 +33,7 @@ MovingMarginM = Annotated[
         ge=0.0,
         le=50.0,
         description="added for a moving obstacle's next change of velocity [m]; none: "
-        f"{_MOVING_MARGIN_M:g} m, likewise",
+        f"{_MOVING_MARGIN_M:g} m, likewise; of the MILP planners no less than 3 m/s times a step",
     ),
     BeforeValidator(_derived),
 ]

@@ -5,18 +5,21 @@ moves may come to a UAS that hovers longer than that, or change its velocity tow
 UAS, in turn, brakes, flies what is left of its backup trajectory, or flies some seconds in one of a
 few directions and brakes, with the vehicle's inner loop. That loop takes over from the backup
 trajectory as soon as it keeps the vehicle's limits: in the middle of a planned manoeuvre it may
-not. Of the flights that keep them each UAS takes the one that comes least too close to anything,
-and of those that are clear the shortest. No solver is asked.
+not. Each UAS takes a flight without a contact, of these one that keeps the limits, of these the one
+that is least in breach, then the one that comes least too close to anything, and of those that are
+clear the shortest. No solver is asked.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.margins import Margins
 from uas_coverage_baselines.milp_mpc.fallback.backup import course_of, prolonged
 from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
@@ -34,7 +37,44 @@ _HEADINGS = 12
 _BETWEEN = np.linspace(0.0, 1.0, 4, endpoint=False)[:, None]  # points measured of each step
 
 
-def evasion(problem: PlanningProblem, dt_s: float, backup: Plan | None = None) -> Plan | None:
+@dataclass(frozen=True)
+class Asked:
+    """What the distances of a decision are made of.
+
+    Attributes:
+        radius_m: of UAS, by name.
+        margins: that are added to what the rules ask for.
+        fence_margin_m: that the rules ask for.
+    """
+
+    radius_m: Mapping[str, float]
+    margins: Margins
+    fence_margin_m: float
+
+    def levels(self, problem: PlanningProblem) -> tuple[PlanningProblem, ...]:
+        """The decision with the distances below which there is a contact, a breach, too little."""
+        radius_m = np.array([self.radius_m[name] for name in problem.names])
+        contact = replace(
+            problem,
+            obstacle_clearance_m=radius_m[:, None] + 0.0 * problem.obstacle_clearance_m,
+            moving_clearance_m=radius_m[:, None] + 0.0 * problem.moving_clearance_m,
+            separation_m=radius_m[:, None] + radius_m,
+            fence_margin_m=0.0,
+            min_height_m=0.0,
+        )
+        breach = replace(
+            problem,
+            obstacle_clearance_m=problem.obstacle_clearance_m - self.margins.fixed_m,
+            moving_clearance_m=problem.moving_clearance_m - self.margins.moving_m,
+            separation_m=problem.separation_m - self.margins.fixed_m,
+            fence_margin_m=self.fence_margin_m,
+        )
+        return contact, breach, problem
+
+
+def evasion(
+    problem: PlanningProblem, dt_s: float, backup: Plan | None = None, asked: Asked | None = None
+) -> Plan | None:
     """A flight of all UAS out of the way of everything, or as far as that is possible.
 
     None where no UAS can do better than to brake at once.
@@ -43,27 +83,32 @@ def evasion(problem: PlanningProblem, dt_s: float, backup: Plan | None = None) -
         problem: the decision; moving obstacles keep their velocities.
         dt_s: sampling time.
         backup: what is left of the last backup trajectory, beginning now; None where there is none.
+        asked: what its distances are made of; None: one distance is as bad as the other.
     """
     longest_s = max(_PUSHES_S) + braking_s(problem.vehicles, dt_s)
     steps = int(np.ceil(longest_s / dt_s))
     ahead = replace(problem, moving=prolonged(problem, steps))
+    levels = (ahead,) if asked is None else asked.levels(ahead)
     flights = [_flights(problem, uas, backup, steps, dt_s) for uas in range(problem.n_uas)]
     # the first flight of each is braking at once, which is kept where it is clear
     chosen = [0] * problem.n_uas
-    alone = [_too_close(ahead, uas, x) for uas, (x, _) in enumerate(flights)]
-    for uas in np.argsort([cost[0] for cost in alone], kind="stable"):
+    alone = [[_too_close(level, uas, x) for level in levels] for uas, (x, _) in enumerate(flights)]
+    for uas in np.argsort([costs[-1][0] for costs in alone], kind="stable"):
         x, _ = flights[uas]
-        cost = alone[uas].copy()
+        costs = [cost.copy() for cost in alone[uas]]
         for other in range(problem.n_uas):
             if other != uas:
                 apart = _dense(x[..., :3] - flights[other][0][chosen[other], :, :3])
-                cost += _squared(problem.separation_m[uas, other] - outside_upright_m(apart))
+                for level, cost in zip(levels, costs, strict=True):
+                    cost += _squared(level.separation_m[uas, other] - outside_upright_m(apart))
         vehicle, bounds = problem.vehicles[uas], problem.norm_bounds[uas]
         exceeds = [exceeds_limits(vehicle, bounds, each[1:]) for each in x]
         # braking at once is how to move least, or else the backup
         moved_m = np.linalg.norm(x[:, -1, :3] - x[np.argmin(exceeds[:2]), -1, :3], axis=1)
         # of directions that are as good the first, whatever the last digits say
-        chosen[uas] = int(np.lexsort((moved_m.round(6), cost.round(6), exceeds))[0])
+        contact, *others = [cost.round(6) for cost in costs]
+        keys = (contact, exceeds, *others) if others else (exceeds, contact)
+        chosen[uas] = int(np.lexsort((moved_m.round(6), *reversed(keys)))[0])
     if not any(chosen):
         return None
     rows = [flights[uas][0][chosen[uas]] for uas in range(problem.n_uas)]
