@@ -5,8 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 from toy_problems import S500, box, moving, state, toy
+from uas_coverage_baselines.margins import Margins
 from uas_coverage_baselines.milp_mpc.fallback import evasion as evasive_flights
-from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
+from uas_coverage_baselines.milp_mpc.fallback.evasion import Asked, evasion
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
@@ -268,3 +269,30 @@ def test_in_a_room_a_small_uas_moves_aside_no_longer_than_there_is_room():
     assert is_clear(problem, plan)
     assert not exceeds_limits(problem.vehicles[0], problem.norm_bounds[0], plan.x[0, 1:])
     assert np.linalg.norm(plan.x[0, -1, :2] - problem.x0[0, :2]) < 2.0
+
+
+def in_a_corridor():
+    """A small UAS between two thin walls, and a person who walks towards it."""
+    walls = [box((x, -50.0, -3.0), (x + 0.15, 50.0, 0.0)) for x in (-1.1, 0.95)]
+    person = moving(np.add((0.0, -2.0, -1.0), np.outer(np.arange(3), (0.0, 0.24, 0.0))), 0.25, 0.9)
+    return toy(
+        state((0.0, 0.0, -1.0)),
+        vehicles=[load_vehicle("crazyflie")],
+        obstacles=walls,
+        clearance_m=0.18,
+        moving_obstacles=[person],
+        moving_clearance_m=0.97,
+        fence=box((-50.0, -50.0, -5.0), (50.0, 50.0, 0.0)),
+        dt_s=0.2,
+        planar=True,
+    )
+
+
+def test_no_wall_is_flown_through_to_keep_more_than_what_is_asked_from_what_comes():
+    problem = in_a_corridor()
+    asked = Asked({"a": 0.07}, Margins(0.01, 0.6), 0.1)
+    assert np.abs(evasion(problem, 0.2).x[0, :, 0]).max() > 0.95, "through it, for less to sum up"
+    plan = evasion(problem, 0.2, asked=asked)
+    assert np.abs(plan.x[0, :, 0]).max() < 0.95 - 0.07
+    away_m = plan.x[0, :, :2] - np.outer(np.arange(len(plan.x[0])), (0.0, 0.24)) - (0.0, -2.0)
+    assert np.hypot(*away_m.T).min() > 0.25 + 0.07
