@@ -6,11 +6,15 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from toy_problems import BY_NODES, planned
+from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.search import team_search
 from uas_coverage_baselines.milp_mpc.search.decision import decide
 from uas_coverage_baselines.milp_mpc.search.heuristic import construct
 from uas_coverage_baselines.milp_mpc.search.restricted import NARROW
 from uas_coverage_baselines.milp_mpc.search.round_robin import RoundRobin
+
+from uas_coverage_env import load_scenario
+from uas_coverage_env.mission import MissionBrief
 
 
 def test_a_share_of_the_work_is_the_joint_programs_once_each_uas_has_a_plan(
@@ -66,3 +70,10 @@ def test_as_many_uas_are_planned_for_as_the_work_suffices_for(problem, of_one, m
     first, then = (search.planned(turns, []) for _ in range(2))
     assert len(first) == len(then) == many
     assert set(first + then) == {0, 1}, "the other one is next"
+
+
+@pytest.mark.parametrize(("name", "share"), [("indoor", 0.2), ("village", 1.0), ("air_taxi", 1.0)])
+def test_a_decision_takes_no_more_than_its_step_is_long(name, share):
+    planner = MilpMpc(MilpMpcOptions(effort=2.0))
+    planner.reset(MissionBrief.of(load_scenario(name)), 0)
+    assert planner._effort().work == pytest.approx(2.0 * share)

@@ -4,13 +4,17 @@ import dataclasses
 
 import numpy as np
 import pytest
-from toy_problems import box, moving, state, toy
+from toy_problems import S500, box, moving, state, toy
+from uas_coverage_baselines.margins import Margins
 from uas_coverage_baselines.milp_mpc.fallback import evasion as evasive_flights
-from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
+from uas_coverage_baselines.milp_mpc.fallback.evasion import Asked, evasion
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
 from uas_coverage_baselines.milp_mpc.model.problem import Plan
 from uas_coverage_baselines.milp_mpc.model.verify import first_trouble
 
+from uas_coverage_env import load_vehicle
+from uas_coverage_env.planning.backup.braking import brake
+from uas_coverage_env.vehicle import compile_vehicle
 from uas_coverage_env.vehicle.layout import THETA, VX, VZ, WY
 
 HERE = (100.0, 100.0, -20.0)
@@ -227,3 +231,68 @@ def test_a_uas_in_mid_manoeuvre_goes_on_with_its_backup_while_another_evades():
     plan = evasion(problem, 1.0, backup)
     assert np.array_equal(plan.x[1, : steps + 1], x[1])
     assert np.linalg.norm(plan.x[0, -1, :3] - HERE) > CLEARANCE_M, "the other makes way"
+
+
+def test_a_uas_in_mid_manoeuvre_levels_out_as_planned_before_it_gets_out_of_the_way():
+    problem = coming(FROM_THE_WEST)
+    limits = problem.vehicles[0].limits
+    x0 = problem.x0.copy()
+    x0[0, [THETA, WY]] = limits.tilt_max_rad, limits.rate_max_radps
+    problem = dataclasses.replace(problem, x0=x0)
+    steps = 3
+    x = np.repeat(x0[:, None], steps + 1, axis=1)
+    x[:, 1:, [THETA, WY]] = 0.0
+    covers = np.zeros((1, steps, problem.n_scenario_waypoints), bool)
+    backup = Plan(problem.names, x, np.zeros((1, steps, 5)), covers, 0.0, -np.inf)
+    plan, vehicle, bounds = evasion(problem, 1.0, backup), S500, problem.norm_bounds[0]
+    at_once = brake(compile_vehicle(vehicle, 1.0)[()], x0[0], STEPS)[0]
+    assert exceeds_limits(vehicle, bounds, at_once)
+    assert not exceeds_limits(vehicle, bounds, plan.x[0, 1:])
+    assert np.array_equal(plan.x[0, :2], x[0, :2])
+    assert is_clear(problem, plan)
+
+
+def test_in_a_room_a_small_uas_moves_aside_no_longer_than_there_is_room():
+    room = box((0.0, 3.7, -3.0), (4.0, 8.3, 0.0))  # two seconds at full speed lead into a wall
+    person = moving(np.add((0.4, 6.0, -1.0), np.outer(np.arange(3), (0.2, 0.0, 0.0))), 0.25, 0.9)
+    problem = toy(
+        state((2.0, 6.0, -1.0)),
+        vehicles=[load_vehicle("crazyflie")],
+        moving_obstacles=[person],
+        moving_clearance_m=0.4,
+        fence=room,
+        fence_margin_m=0.2,
+        dt_s=0.2,
+        planar=True,
+    )
+    plan = evasion(problem, 0.2)
+    assert is_clear(problem, plan)
+    assert not exceeds_limits(problem.vehicles[0], problem.norm_bounds[0], plan.x[0, 1:])
+    assert np.linalg.norm(plan.x[0, -1, :2] - problem.x0[0, :2]) < 2.0
+
+
+def in_a_corridor():
+    """A small UAS between two thin walls, and a person who walks towards it."""
+    walls = [box((x, -50.0, -3.0), (x + 0.15, 50.0, 0.0)) for x in (-1.1, 0.95)]
+    person = moving(np.add((0.0, -2.0, -1.0), np.outer(np.arange(3), (0.0, 0.24, 0.0))), 0.25, 0.9)
+    return toy(
+        state((0.0, 0.0, -1.0)),
+        vehicles=[load_vehicle("crazyflie")],
+        obstacles=walls,
+        clearance_m=0.18,
+        moving_obstacles=[person],
+        moving_clearance_m=0.97,
+        fence=box((-50.0, -50.0, -5.0), (50.0, 50.0, 0.0)),
+        dt_s=0.2,
+        planar=True,
+    )
+
+
+def test_no_wall_is_flown_through_to_keep_more_than_what_is_asked_from_what_comes():
+    problem = in_a_corridor()
+    asked = Asked({"a": 0.07}, Margins(0.01, 0.6), 0.1)
+    assert np.abs(evasion(problem, 0.2).x[0, :, 0]).max() > 0.95, "through it, for less to sum up"
+    plan = evasion(problem, 0.2, asked=asked)
+    assert np.abs(plan.x[0, :, 0]).max() < 0.95 - 0.07
+    away_m = plan.x[0, :, :2] - np.outer(np.arange(len(plan.x[0])), (0.0, 0.24)) - (0.0, -2.0)
+    assert np.hypot(*away_m.T).min() > 0.25 + 0.07

@@ -12,6 +12,7 @@ from uas_coverage_baselines.milp_mpc.model.problem import Plan, Target, Weights
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
 
+from uas_coverage_env import load_scenario
 from uas_coverage_env.entities.state import LANDED
 from uas_coverage_env.mission import MissionBrief, Ways
 from uas_coverage_env.simulation import World
@@ -63,6 +64,15 @@ def test_clearances_are_the_sums_that_the_paper_writes_and_the_margins(scenario,
     )
     assert problem.separation_m[0, 1] == pytest.approx(0.36 + 0.5 + 5.0 + margins.fixed_m)
     assert 0.5 <= problem.fence_margin_m <= 0.5 + margins.fixed_m
+
+
+@pytest.mark.parametrize(("dt_s", "kept_m"), [(0.2, 0.6), (0.02, 0.12)])
+def test_what_moves_is_kept_from_by_a_change_of_3_mps_until_the_next_sample(dt_s, kept_m):
+    brief = MissionBrief.of(load_scenario("indoor").model_copy(update={"dt_s": dt_s}))
+    margins = MilpMpcOptions().margins(brief)
+    assert margins.moving_m == pytest.approx(kept_m, rel=0.05)
+    assert margins.fixed_m == pytest.approx(0.012, rel=0.05)
+    assert MilpMpcOptions(moving_margin_m=0.1).margins(brief).moving_m == 0.1
 
 
 def test_each_uas_is_planned_with_its_own_vehicle_and_its_own_battery(scenario, around):

@@ -304,3 +304,13 @@ def test_the_backup_of_others_is_no_plan_of_a_uas_that_has_none():
     of_a = plan_of(flown(S500, x0, [(0.0, 0.0, 0.0)] * 4))
     assert len(fallback_plans(problem, 0, of_a, 1.0)) == 2
     assert len(fallback_plans(problem, 1, of_a, 1.0)) == 1
+
+
+def test_there_is_none_where_braking_would_lean_too_far_from_each_step():
+    limits = S500.limits
+    plan = plan_of(flown(S500, state((60.0, 60.0, -10.0)), [(6.0, 0.0, 0.0)] * 2))
+    problem = toy(plan.x[0, 0], horizon=2)
+    assert backup_trajectory(problem, plan, 1.0) is not None
+    plan.x[0, 1:, PHI], plan.x[0, 1:, WX] = 0.9 * limits.tilt_max_rad, 0.9 * limits.rate_max_radps
+    assert first_trouble(problem, plan) is None, "what the plan itself flies is clear"
+    assert backup_trajectory(problem, plan, 1.0) is None

@@ -10,10 +10,9 @@ from typing import Generic, Self, TypeVar
 
 import numpy as np
 
-from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.milp_mpc.commands import first_inputs, hovering
 from uas_coverage_baselines.milp_mpc.fallback.backup import backup_trajectory, still_holds
-from uas_coverage_baselines.milp_mpc.fallback.evasion import evasion
+from uas_coverage_baselines.milp_mpc.fallback.evasion import Asked, evasion
 from uas_coverage_baselines.milp_mpc.fallback.reasons import Reason
 from uas_coverage_baselines.milp_mpc.fallback.route_following import RouteFollower, Sent
 from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named, checked
@@ -112,8 +111,10 @@ class MovingHorizon(ABC, Generic[Chosen]):
             self._steering = along_order(brief, seed)
         self.last_plan = self.plan = self._backup = None
         self._round_robin = RoundRobin()
-        margins = margins_in(brief, self.options.margin_m, self.options.moving_margin_m)
+        margins = self.options.margins(brief)
         self._near_home_m = length_scale(brief.vehicles, brief.dt_s) * _CAREFUL_WITHIN_M
+        radius_m = {uas.name: uas.radius_m for uas in brief.uas}
+        self._asked = Asked(radius_m, margins, brief.geofence.margin_m)
         self._follower = RouteFollower(brief, margins.fixed_m, self.blocks)
         self._returning_home = frozenset[str]()  # UAS that fly home since their charge runs short
         self._attempts = Attempts(brief)
@@ -155,7 +156,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
         if reason is not None:
             plan = backup = self._backup
             if backup is None or not still_holds(problem, backup, self.blocks):
-                plan = backup = evasion(problem, self.dt_s, backup)
+                plan = backup = evasion(problem, self.dt_s, backup, self._asked)
         renewed = () if reason or plan is None else plan.renewed
         followed = self._follower.apply(
             problem, swarm, backup, renewed, {name: to for name, (to, _) in overruled.items()}
@@ -206,7 +207,7 @@ class MovingHorizon(ABC, Generic[Chosen]):
 
     def _effort(self) -> Effort:
         return Effort(
-            work=self.options.effort,
+            work=self.options.effort * min(self.dt_s, 1.0),  # shorter steps are due sooner
             threads=self.options.threads,
             teams=self.options.teams,
             at_once=self.options.at_once,

@@ -7,11 +7,12 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from uas_coverage_baselines.margins import MarginM, MovingMarginM
+from uas_coverage_baselines.margins import MarginM, Margins, MovingMarginM, margins_in
 from uas_coverage_baselines.milp_mpc.model.named_blocks import block_named
 from uas_coverage_baselines.milp_mpc.model.problem import Weights
 from uas_coverage_baselines.milp_mpc.solvers import solver_named
 from uas_coverage_env.flight import PlannerOptions
+from uas_coverage_env.mission import MissionBrief
 
 
 def weight(default: float, what: str) -> Any:
@@ -86,6 +87,10 @@ class OcpOptions(PlannerOptions):
         named = {one.name: getattr(self, f"weight_{one.name}", None) for one in fields(Weights)}
         return Weights(**{name: value for name, value in named.items() if value is not None})
 
+    def margins(self, brief: MissionBrief) -> Margins:
+        """What is added to clearances in a mission."""
+        return margins_in(brief, self.margin_m, self.moving_margin_m, sampled=True)
+
     @model_validator(mode="before")
     @classmethod
     def _gone(cls, given: Any) -> Any:
@@ -122,7 +127,8 @@ class MovingHorizonOptions(OcpOptions):
         default=1.0,
         gt=0.0,
         le=1000.0,
-        description="work per decision, the same on every machine; 1 takes about 1 s of a core",
+        description="work per decision, the same on every machine; 1 takes about 1 s of a core, or "
+        "a step where that is shorter",
     )
     time_limit_s: TimeLimitS = Field(
         default=None,

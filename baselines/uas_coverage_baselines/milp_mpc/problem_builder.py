@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.milp_mpc.model.blocks.battery_reserve import (
     seconds_onward,
     straight_seconds_home,
@@ -48,7 +47,7 @@ class ProblemBuilder:
 
     def __init__(self, brief: MissionBrief, options: OcpOptions, ways: Ways | None = None) -> None:
         self._ways = ways
-        self._margins = margins_in(brief, options.margin_m, options.moving_margin_m)
+        self._margins = options.margins(brief)
         self.brief, self._options, self._form = brief, options, options.form
         self._view = WorldView(brief)
         self.dt_s = brief.dt_s

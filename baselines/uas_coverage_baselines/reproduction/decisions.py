@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uas_coverage_baselines.margins import margins_in
 from uas_coverage_baselines.milp_mpc.model.problem import PlanningProblem
 from uas_coverage_baselines.milp_mpc.planner import MilpMpc, MilpMpcOptions
 from uas_coverage_baselines.milp_mpc.problem_builder import ProblemBuilder
@@ -71,7 +70,7 @@ def whole_decision(flight: Flight, step: int = 0) -> PlanningProblem:
     if len(problem.obstacles) < len(every_obstacle):
         safe_m = np.array([obstacle.safe_distance_m for obstacle in brief.obstacles])
         radius_m = np.array([uas.radius_m for uas in brief.uas if uas.name in problem.names])
-        margins = margins_in(brief, options.margin_m, options.moving_margin_m)
+        margins = options.margins(brief)
         clearance_m = radius_m[:, None] + safe_m + margins.fixed_m
         problem = replace(problem, obstacles=every_obstacle, obstacle_clearance_m=clearance_m)
     return replace(problem, physical_sides=options.limit_sides, prune=False)

@@ -57,6 +57,8 @@ def backup_trajectory(
     checks = _ByBlocks(problem, longer, blocks, supervisor.braking_steps)
     courses = {uas: course_of(plan, name) for uas, name in enumerate(problem.names)}
     for followed, team in supervisor.teams(checks, courses):
+        if not all(checks.keeps_limits(uas, team[uas], n) for uas, n in followed.items()):
+            continue
         result = _joined(problem, plan, followed, team)
         if trouble(longer, result, blocks) is None:
             return result
@@ -93,16 +95,19 @@ class _ByBlocks:
 
     def may_stop(self, uas: int, course: Course, followed: int) -> bool:
         """Whether nothing is wrong with it, and braking keeps the limits."""
-        problem, end = self._problem, followed + self._braking_steps
+        end = followed + self._braking_steps
         x, u = course.x[: end + 1], course.u[:end]
-        covers = np.zeros((1, end, problem.n_scenario_waypoints), bool)
+        covers = np.zeros((1, end, self._problem.n_scenario_waypoints), bool)
         alone = Plan(self._alone[uas].names, x[None], u[None], covers, 0.0, -np.inf)
-        # a plan's end may leave braking no way to keep the limits
-        vehicle, bounds = problem.vehicles[uas], problem.norm_bounds[uas]
-        return not (
-            exceeds_limits(vehicle, bounds, x[followed + 1 :])
-            or trouble(self._alone[uas], alone, self._blocks) is not None
+        return (
+            self.keeps_limits(uas, course, followed)
+            and trouble(self._alone[uas], alone, self._blocks) is None
         )
+
+    def keeps_limits(self, uas: int, course: Course, followed: int) -> bool:
+        """Whether braking keeps the limits, to which the end of a plan may leave it no way."""
+        vehicle, bounds = self._problem.vehicles[uas], self._problem.norm_bounds[uas]
+        return not exceeds_limits(vehicle, bounds, course.x[followed + 1 :])
 
     def comes_home(self, uas: int, x: FloatArray) -> bool:
         """Whether its charge suffices; one that is late whatever it does is not held up."""

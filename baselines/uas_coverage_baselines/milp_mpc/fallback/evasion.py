@@ -3,36 +3,78 @@
 A backup trajectory ends in a hover, and it is verified for as long as it lasts. Something that
 moves may come to a UAS that hovers longer than that, or change its velocity towards it. Then each
 UAS, in turn, brakes, flies what is left of its backup trajectory, or flies some seconds in one of a
-few directions and brakes, with the vehicle's inner loop. Of these flights it takes the one that
-comes least too close to anything; of those that are clear one that keeps the vehicle's limits, and
-of them the shortest. No solver is asked.
+few directions and brakes, with the vehicle's inner loop. That loop takes over from the backup
+trajectory as soon as it keeps the vehicle's limits: in the middle of a planned manoeuvre it may
+not. Each UAS takes a flight without a contact, of these one that keeps the limits, of these the one
+that is least in breach, then the one that comes least too close to anything, and of those that are
+clear the shortest. No solver is asked.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from uas_coverage_baselines.margins import Margins
 from uas_coverage_baselines.milp_mpc.fallback.backup import course_of, prolonged
 from uas_coverage_baselines.milp_mpc.model.height import too_low_m
 from uas_coverage_baselines.milp_mpc.model.norm_bounds import exceeds_limits
 from uas_coverage_baselines.milp_mpc.model.problem import Plan, PlanningProblem
 from uas_coverage_env.geometry.round_shapes import outside_upright_m
 from uas_coverage_env.planning.backup.braking import pushed
-from uas_coverage_env.planning.backup.course import braked
+from uas_coverage_env.planning.backup.course import Course, braked
 from uas_coverage_env.vehicle import compile_vehicle
+from uas_coverage_env.vehicle.governor import time_scale
 from uas_coverage_env.vehicle.scale import braking_s
 
 FloatArray = NDArray[np.float64]
-_PUSHES_S = (2.0, 5.0, 10.0)  # how long a direction is held
+_PUSHES_S = (2.0, 5.0, 10.0)  # how long a direction is held, at the time scale 1
 _HEADINGS = 12
 _BETWEEN = np.linspace(0.0, 1.0, 4, endpoint=False)[:, None]  # points measured of each step
 
 
-def evasion(problem: PlanningProblem, dt_s: float, backup: Plan | None = None) -> Plan | None:
+@dataclass(frozen=True)
+class Asked:
+    """What the distances of a decision are made of.
+
+    Attributes:
+        radius_m: of UAS, by name.
+        margins: that are added to what the rules ask for.
+        fence_margin_m: that the rules ask for.
+    """
+
+    radius_m: Mapping[str, float]
+    margins: Margins
+    fence_margin_m: float
+
+    def levels(self, problem: PlanningProblem) -> tuple[PlanningProblem, ...]:
+        """The decision with the distances below which there is a contact, a breach, too little."""
+        radius_m = np.array([self.radius_m[name] for name in problem.names])
+        contact = replace(
+            problem,
+            obstacle_clearance_m=radius_m[:, None] + 0.0 * problem.obstacle_clearance_m,
+            moving_clearance_m=radius_m[:, None] + 0.0 * problem.moving_clearance_m,
+            separation_m=radius_m[:, None] + radius_m,
+            fence_margin_m=0.0,
+            min_height_m=0.0,
+        )
+        breach = replace(
+            problem,
+            obstacle_clearance_m=problem.obstacle_clearance_m - self.margins.fixed_m,
+            moving_clearance_m=problem.moving_clearance_m - self.margins.moving_m,
+            separation_m=problem.separation_m - self.margins.fixed_m,
+            fence_margin_m=self.fence_margin_m,
+        )
+        return contact, breach, problem
+
+
+def evasion(
+    problem: PlanningProblem, dt_s: float, backup: Plan | None = None, asked: Asked | None = None
+) -> Plan | None:
     """A flight of all UAS out of the way of everything, or as far as that is possible.
 
     None where no UAS can do better than to brake at once.
@@ -41,27 +83,32 @@ def evasion(problem: PlanningProblem, dt_s: float, backup: Plan | None = None) -
         problem: the decision; moving obstacles keep their velocities.
         dt_s: sampling time.
         backup: what is left of the last backup trajectory, beginning now; None where there is none.
+        asked: what its distances are made of; None: one distance is as bad as the other.
     """
     longest_s = max(_PUSHES_S) + braking_s(problem.vehicles, dt_s)
     steps = int(np.ceil(longest_s / dt_s))
     ahead = replace(problem, moving=prolonged(problem, steps))
+    levels = (ahead,) if asked is None else asked.levels(ahead)
     flights = [_flights(problem, uas, backup, steps, dt_s) for uas in range(problem.n_uas)]
     # the first flight of each is braking at once, which is kept where it is clear
     chosen = [0] * problem.n_uas
-    alone = [_too_close(ahead, uas, x) for uas, (x, _) in enumerate(flights)]
-    for uas in np.argsort([cost[0] for cost in alone], kind="stable"):
+    alone = [[_too_close(level, uas, x) for level in levels] for uas, (x, _) in enumerate(flights)]
+    for uas in np.argsort([costs[-1][0] for costs in alone], kind="stable"):
         x, _ = flights[uas]
-        cost = alone[uas].copy()
+        costs = [cost.copy() for cost in alone[uas]]
         for other in range(problem.n_uas):
             if other != uas:
                 apart = _dense(x[..., :3] - flights[other][0][chosen[other], :, :3])
-                cost += _squared(problem.separation_m[uas, other] - outside_upright_m(apart))
-        moved_m = np.linalg.norm(x[:, -1, :3] - x[0, -1, :3], axis=1)
-        # the inner loop may take over in the middle of a planned manoeuvre
+                for level, cost in zip(levels, costs, strict=True):
+                    cost += _squared(level.separation_m[uas, other] - outside_upright_m(apart))
         vehicle, bounds = problem.vehicles[uas], problem.norm_bounds[uas]
         exceeds = [exceeds_limits(vehicle, bounds, each[1:]) for each in x]
+        # braking at once is how to move least, or else the backup
+        moved_m = np.linalg.norm(x[:, -1, :3] - x[np.argmin(exceeds[:2]), -1, :3], axis=1)
         # of directions that are as good the first, whatever the last digits say
-        chosen[uas] = int(np.lexsort((moved_m.round(6), exceeds, cost.round(6)))[0])
+        contact, *others = [cost.round(6) for cost in costs]
+        keys = (contact, exceeds, *others) if others else (exceeds, contact)
+        chosen[uas] = int(np.lexsort((moved_m.round(6), *reversed(keys)))[0])
     if not any(chosen):
         return None
     rows = [flights[uas][0][chosen[uas]] for uas in range(problem.n_uas)]
@@ -74,22 +121,49 @@ def _flights(
     problem: PlanningProblem, uas: int, backup: Plan | None, steps: int, dt_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """States (C, steps+1, 14) and inputs (C, steps, 5): braking, the backup, other directions."""
-    limits = problem.vehicles[uas].limits
-    record = compile_vehicle(problem.vehicles[uas], dt_s)[()]
+    vehicle, x0 = problem.vehicles[uas], problem.x0[uas]
+    record = compile_vehicle(vehicle, dt_s)[()]
+    flown = [pushed(record, x0, 0.0, 0.0, 0.0, 0, steps)]
+    left = Course(0, x0[None], np.zeros((0, 5)), False)
+    if backup is not None and problem.names[uas] in backup.names:
+        left = course_of(backup, problem.names[uas])
+        held = braked(record, left, len(left.u), max(steps - len(left.u), 0))
+        flown.append((held.x[: steps + 1], held.u[:steps]))
+    lag = _handed_over(problem, uas, left, flown[0][0], steps, dt_s)
+    start = np.ascontiguousarray(left.x[lag]) if lag else x0
+    for way in _ways(problem, uas, dt_s):
+        x, u = pushed(record, start, *way, steps - lag)
+        flown.append((np.vstack([left.x[:lag], x]), np.vstack([left.u[:lag], u])))
+    return np.array([x for x, _ in flown]), np.array([u for _, u in flown])
+
+
+def _handed_over(
+    problem: PlanningProblem, uas: int, left: Course, braking: FloatArray, steps: int, dt_s: float
+) -> int:
+    """First step of a backup trajectory at which braking keeps the limits; 0 where none does."""
+    vehicle, bounds = problem.vehicles[uas], problem.norm_bounds[uas]
+    if not left.begins_at(problem.x0[uas]) or not exceeds_limits(vehicle, bounds, braking[1:]):
+        return 0
+    record = compile_vehicle(vehicle, dt_s)[()]
+    for lag in range(1, min(len(left.u), steps) + 1):
+        if not exceeds_limits(vehicle, bounds, braked(record, left, lag, steps - lag).x[1:]):
+            return lag
+    return 0
+
+
+def _ways(problem: PlanningProblem, uas: int, dt_s: float) -> list[tuple[float, float, float, int]]:
+    """Velocities north, east and down, and for how many steps they are held."""
+    vehicle = problem.vehicles[uas]
+    limits, scale = vehicle.limits, min(time_scale(vehicle, dt_s), 1.0)
     angles = 2.0 * np.pi * np.arange(_HEADINGS) / _HEADINGS
     level = [(0.0, 0.0)]
     level += [(limits.v_xy_max_mps * np.cos(a), limits.v_xy_max_mps * np.sin(a)) for a in angles]
     down = (0.0,) if problem.planar else (0.0, -limits.v_up_max_mps, limits.v_down_max_mps)
-    pushes = [int(np.ceil(push_s / dt_s)) for push_s in _PUSHES_S]
-    ways = [(0.0, 0.0, 0.0, 0)]
-    ways += [(*a, d, push) for a, d, push in product(level, down, pushes) if (*a, d) != (0, 0, 0)]
-    flown = [pushed(record, problem.x0[uas], *way, steps) for way in ways]
-    if backup is not None and problem.names[uas] in backup.names:
-        left = course_of(backup, problem.names[uas])
-        followed = min(len(left.u), steps)
-        held = braked(record, left, followed, steps - followed)
-        flown.insert(1, (held.x, held.u))
-    return np.array([x for x, _ in flown]), np.array([u for _, u in flown])
+    pushes = [int(np.ceil(scale * push_s / dt_s)) for push_s in _PUSHES_S]
+    return [
+        (0.0, 0.0, 0.0, 0),
+        *((*a, d, n) for a, d, n in product(level, down, pushes) if (*a, d) != (0, 0, 0)),
+    ]
 
 
 def _too_close(problem: PlanningProblem, uas: int, x: FloatArray) -> FloatArray:
