@@ -72,7 +72,7 @@ def main(
             for c in zip(*measured, strict=True)
         ]
         table.add_row(name, f"{accomplished} of {len(pairs)}", *map(str, sums), *spread)
-    Console(width=150).print(table)
+    Console(width=220).print(table)
 
 
 if __name__ == "__main__":
