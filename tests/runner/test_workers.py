@@ -133,6 +133,15 @@ def test_ctrl_c_is_for_the_owner_alone_from_the_start_of_a_process_on(pair):
     assert not some_jobs.held()
 
 
+@pytest.fixture
+def heeding_ctrl_c():
+    """Shells start what runs in the background so that it ignores Ctrl-C; it would be no signal."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heeding_ctrl_c")
 def test_ctrl_c_just_before_it_waits_ends_the_wait_before_the_jobs_do(pair, tmp_path):
     # this says that a signal has come, and interrupts no call of the system
     threading.Timer(0.5, _thread.interrupt_main).start()
