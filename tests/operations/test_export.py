@@ -8,6 +8,7 @@ import warnings
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,12 @@ pytest.importorskip("pyproj")
 from geographiclib.geodesic import Geodesic
 from pymavlink import mavwp
 from qgc_loader import problems
+from rich.console import Console
 from small_worlds import box, meadow, waypoint
 
 from uas_coverage_env import generate_scenario, load_planner, rollout
 from uas_coverage_env.cli import main
+from uas_coverage_env.cli.operations import _report_export
 from uas_coverage_env.features.wind import Wind
 from uas_coverage_env.files.errors import InputError
 from uas_coverage_env.operations import ExportOptions, make_export
@@ -271,6 +274,20 @@ def test_the_command_shows_what_is_left_in_wind_in_a_column_of_its_own(
         head, row = capsys.readouterr().out.splitlines()[:2]
         assert ("spare in wind" in head) == bool(more)
         assert row.count("%") == 2 + len(more) // 2
+
+
+def test_a_uas_that_meets_no_wind_where_another_does_has_an_empty_cell(capsys):
+    of_one = {"begins_s": 0.0, "legs": [], "duration_s": 1.0, "planned_s": 1.0, "soc_landed": 0.5}
+    left = {"least_spare": {"spare": 0.25}}
+    fleet = [
+        of_one | left | {"name": name, "in_wind": wind}
+        for name, wind in (("calm", None), ("windy", {"least_spare": {"spare": 0.125}}))
+    ]
+    made = SimpleNamespace(data={"uas": fleet, "turnarounds": []}, grounded=(), files=())
+    _report_export(Console(width=120), made, Path("there"))
+    _, calm, windy = capsys.readouterr().out.splitlines()[:3]
+    assert calm.split()[-1] == "25.0%"
+    assert windy.split()[-2:] == ["25.0%", "12.5%"]
 
 
 def test_who_makes_no_headway_against_the_wind_has_no_return():

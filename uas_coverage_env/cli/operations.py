@@ -1,9 +1,10 @@
 """`uas-coverage import` and `export`: from a drawn area to a mission, from a flight to files."""
 
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -243,6 +244,11 @@ def export(asked: AskedExport) -> None:
     warn(made.notes)
 
 
+def _spare(of: Mapping[str, Any] | None) -> str:
+    """What is left at the least; a UAS may meet no wind where another does."""
+    return "" if of is None else f"{of['least_spare']['spare']:.1%}"
+
+
 def _report_export(screen: Console, made: "Export", out: Path) -> None:
     """What each UAS flies, with what charge, and what is to be done between its sorties."""
     table = Table(
@@ -259,8 +265,8 @@ def _report_export(screen: Console, made: "Export", out: Path) -> None:
             f"{uas['duration_s']:.0f}",
             f"{uas['planned_s']:.0f}",
             f"{uas['soc_landed']:.1%}",
-            f"{uas['least_spare']['spare']:.1%}",
-            *([f"{uas['in_wind']['least_spare']['spare']:.1%}"] if windy else []),
+            _spare(uas),
+            *([_spare(uas["in_wind"])] if windy else []),
         )
     screen.print(table)
     for name in made.grounded:
